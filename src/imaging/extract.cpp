@@ -44,6 +44,10 @@ const Volume& prepare(const Volume& volume, const Extraction& requested, const S
     become(coarsen(*field, requested.voxel));
     remarks.push_back("averaged to " + size_text(*field));
   }
+  if (!requested.box) return *field;
+  if (const int64_t outside = leave_out((*requested.box)[0], (*requested.box)[1], changed))
+    remarks.push_back(fmt::format("{} of these {} voxels lie outside the box and are left out",
+                                  outside, changed.values.size()));
   return *field;
 }
 

@@ -3,17 +3,16 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "cube_cases.h"
 #include "repose/base/error.h"
 #include "repose/imaging/volume_filter.h"
+#include "repose/surface/component.h"
 
 namespace repose::imaging {
 using namespace surface;
 namespace {
 
-constexpr float beyond = -std::numeric_limits<float>::infinity();
 constexpr double nearest_to_end = 1e-3;  // of an edge; keeps triangles from being flat
 
 /// One slice of grid points with a margin of one around it where the border is closed, and the
@@ -37,7 +36,7 @@ class Marching {
     for (int i = 0; i < 16; ++i)
       for (int bit = 0; bit < 4; ++bit) spread_[i] |= (i >> bit & 1) << (2 * bit);
     for (Slice* slice : {&lower_, &upper_}) {
-      slice->values.assign(columns_ * rows_, beyond);
+      slice->values.assign(columns_ * rows_, beyond_volume);
       slice->inside.assign(columns_ * rows_, 0);
       for (auto& vertices : slice->vertex) vertices.resize(columns_ * rows_);
     }
@@ -63,7 +62,7 @@ class Marching {
   /// Values, inside or not, and vertices within slice k; beyond the volume all is outside.
   void fill(Slice& slice, int64_t k) {
     if (k < 0 || k >= volume_.size[2]) {
-      std::fill(slice.values.begin(), slice.values.end(), beyond);
+      std::fill(slice.values.begin(), slice.values.end(), beyond_volume);
       std::fill(slice.inside.begin(), slice.inside.end(), uint8_t{0});
       return;
     }
@@ -128,8 +127,19 @@ class Marching {
     if (any == 0 || all == 15) return;
     for (int64_t i = 0; i + 1 < columns_; ++i) {
       const int corners = spread_[codes_[i]] | spread_[codes_[i + 1]] << 1;
-      if (corners != 0 && corners != 255) add_triangles(cases_[corners], i, j);
+      if (corners == 0 || corners == 255) continue;
+      if (margin_ == 0 && reaches_beyond(i, j)) continue;
+      add_triangles(cases_[corners], i, j);
     }
+  }
+
+  /// Returns whether a corner of the cube counts as beyond the volume.
+  bool reaches_beyond(int64_t i, int64_t j) const {
+    for (const Slice* slice : {&lower_, &upper_})
+      for (const int64_t row : {j, j + 1})
+        for (const int64_t column : {i, i + 1})
+          if (slice->values[at(column, row)] == beyond_volume) return true;
+    return false;
   }
 
   void add_triangles(const CubeTriangles& triangles, int64_t i, int64_t j) {
@@ -166,6 +176,8 @@ Surface isosurface(const Volume& volume, double level, VolumeBorder border, cons
     base::refuse("{}: no surface at level {:g}; choose one in between: {}", volume.name, level,
                  describe_values(volume));
   Surface surface = Marching(volume, level, border).run(watch);
+  if (std::find(volume.values.begin(), volume.values.end(), beyond_volume) != volume.values.end())
+    surface = compact("", surface.points, std::move(surface.triangles));  // some in no triangle
   surface.name = volume.name;
   return surface;
 }

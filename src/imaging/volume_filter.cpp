@@ -12,6 +12,7 @@ namespace repose::imaging {
 std::array<float, 2> value_range(const Volume& volume) {
   float minimum = std::numeric_limits<float>::infinity(), greatest = -minimum;
   for (const float value : volume.values) {
+    if (value == beyond_volume) continue;
     minimum = std::min(minimum, value);
     greatest = std::max(greatest, value);
   }
@@ -73,6 +74,14 @@ Volume block(const Volume& volume, const std::array<int64_t, 3>& begin,
   return part;
 }
 
+namespace {
+
+[[noreturn]] void refuse_beside(const Volume& volume, const Vec3& low, const Vec3& high) {
+  base::refuse("{}: the box {:g} to {:g} mm lies beside it", volume.name, low, high);
+}
+
+}  // namespace
+
 Volume crop(const Volume& volume, const Vec3& low, const Vec3& high) {
   const Mat3 to_index = volume.axes.inverse();
   Vec3 first = Vec3::Constant(std::numeric_limits<double>::infinity()), last = -first;
@@ -88,10 +97,31 @@ Volume crop(const Volume& volume, const Vec3& low, const Vec3& high) {
     const auto maximum = static_cast<double>(volume.size[axis] - 1);
     begin[axis] = static_cast<int64_t>(std::clamp(std::floor(first[axis] + 1e-6), 0.0, maximum));
     end[axis] = static_cast<int64_t>(std::clamp(std::ceil(last[axis] - 1e-6), 0.0, maximum)) + 1;
-    if (end[axis] - begin[axis] < 2)
-      base::refuse("{}: the box {:g} to {:g} mm lies beside it", volume.name, low, high);
+    if (end[axis] - begin[axis] < 2) refuse_beside(volume, low, high);
   }
   return block(volume, begin, end);
+}
+
+int64_t leave_out(const Vec3& low, const Vec3& high, Volume& volume) {
+  constexpr double straight = 1e-3;  // of a step, that it may stray from x, y or z
+  const Mat3 steps = volume.axes.cwiseAbs();
+  Vec3 margin;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double along = steps.row(axis).maxCoeff();
+    const bool oblique = steps.row(axis).sum() > (1 + straight) * along;
+    margin[axis] = oblique ? straight * along : std::numeric_limits<double>::infinity();
+  }
+  int64_t count = 0;
+  for (size_t v = 0; v < volume.values.size(); ++v) {
+    const Vec3 center = volume.center(static_cast<int64_t>(v));
+    if ((center.array() >= (low - margin).array()).all() &&
+        (center.array() <= (high + margin).array()).all())
+      continue;
+    volume.values[v] = beyond_volume;
+    ++count;
+  }
+  if (count == static_cast<int64_t>(volume.values.size())) refuse_beside(volume, low, high);
+  return count;
 }
 
 }  // namespace repose::imaging

@@ -17,9 +17,9 @@ enum class VolumeBorder {
 /// flat), triangles counter-clockwise seen from where values are below the level. On a face whose
 /// corners alternate, corners at or above the level are always parted, from either side, and no
 /// triangle has a diagonal within a face of a cube: so the result is manifold, and closed but for
-/// an open border, by construction (see cube_cases.h). Nothing is welded. Throws InputError, naming
-/// the range, where no value or every value is at or above the level. O(voxels); memory beside the
-/// result: three slices.
+/// an open border, by construction (see cube_cases.h). Voxels of beyond_volume are outside the
+/// border. Nothing is welded. Throws InputError, naming the range, where no value or every value is
+/// at or above the level. O(voxels); memory beside the result: three slices.
 Surface isosurface(const Volume& volume, double level, VolumeBorder border = VolumeBorder::closed,
                    const Watch& watch = {});
 

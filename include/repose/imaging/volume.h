@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -14,6 +15,9 @@ namespace repose::imaging {
 /// Told the share of a step's work that is done, in [0, 1]; may be empty.
 using Watch = std::function<void(double)>;
 
+/// Value of the voxels that count as those beyond the border, see leave_out().
+constexpr float beyond_volume = -std::numeric_limits<float>::infinity();
+
 /// Numbers at the points of a regular, perhaps oblique or sheared grid: voxel (i, j, k) has its
 /// center at origin + axes · (i, j, k).
 struct Volume {
@@ -21,7 +25,7 @@ struct Volume {
   std::array<int64_t, 3> size{};     ///< voxels along i, j, k; each at least 2
   Mat3 axes = Mat3::Identity();      ///< mm, LPS; column a is one step along axis a
   Vec3 origin = Vec3::Zero();        ///< mm, LPS; center of voxel (0, 0, 0)
-  std::vector<float> values;         ///< [k][j][i], HU or labels; all finite
+  std::vector<float> values;         ///< [k][j][i], HU or labels; finite, or beyond_volume
   std::vector<std::string> remarks;  ///< what was done to the data on reading, a line each
 
   int64_t index(int64_t i, int64_t j, int64_t k) const { return (k * size[1] + j) * size[0] + i; }

@@ -6,7 +6,7 @@
 /// From one volume to another, or to a number, before a surface is taken from it.
 namespace repose::imaging {
 
-/// Least and greatest value.
+/// Least and greatest finite value.
 std::array<float, 2> value_range(const Volume& volume);
 
 /// Describes the range of values for a message; where they fit in 8 bits, also the range that
@@ -24,6 +24,11 @@ Volume block(const Volume& volume, const std::array<int64_t, 3>& begin,
 /// The smallest block of voxels that holds the box from `low` to `high` (mm, LPS). Throws
 /// InputError where box and volume do not overlap in at least two voxels along each axis.
 Volume crop(const Volume& volume, const Vec3& low, const Vec3& high);
+
+/// Sets voxels to beyond_volume whose centers lie outside the box in x, y or z, where rows of
+/// voxels are oblique to that axis. Where they are along it, crop() is all. Returns how many.
+/// Throws InputError where no voxel is left.
+int64_t leave_out(const Vec3& low, const Vec3& high, Volume& volume);
 
 /// Fewer, larger voxels, each the mean over its part of the volume; `spacing` mm along each axis,
 /// rounded so that they fill the volume; an axis that is coarser already is kept.

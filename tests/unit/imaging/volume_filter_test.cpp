@@ -3,7 +3,7 @@
 #include <Eigen/Geometry>
 
 #include "../surface/shapes.h"
-#include "repose/imaging/isosurface.h"
+#include "repose/imaging/extract.h"
 #include "repose/surface/component.h"
 #include "repose/surface/defects.h"
 #include "volumes.h"
@@ -34,6 +34,55 @@ TEST(VolumeFilter, crop_keeps_every_voxel_in_its_place) {
   }
   EXPECT_NE(refusal([&] {
               crop(part, {50, 50, 50}, {60, 60, 60});
+            }).find("lies beside it"),
+            std::string::npos);
+}
+
+/// A slab whose surface crosses the sides of a box, in volumes along the axes, turned and sheared.
+TEST(VolumeFilter, a_box_is_one_along_x_y_and_z_in_oblique_volumes_too) {
+  Mat3 sheared = Mat3::Identity();
+  sheared(1, 2) = 0.5;
+  const Mat3 turned = Eigen::AngleAxisd(0.35, Vec3::UnitZ()).toRotationMatrix();
+  const Vec3 low(-8, -7, -6), high(9, 6, 7);
+  for (const Mat3& axes : {Mat3(Mat3::Identity()), turned, sheared})
+    for (const VolumeBorder border : {VolumeBorder::closed, VolumeBorder::open}) {
+      Extraction requested;
+      requested.level = 0;
+      requested.box = {low, high};
+      requested.border = border;
+      const Volume volume =
+          sampled(60, axes, [](const Vec3& p) { return 3.25 - std::abs(p.x() - 0.3 * p.z()); });
+      const Extracted result = extract(volume, requested);
+      const Defects defects = inspect(result.surface, false);
+      EXPECT_EQ(defects.border_edges == 0, border == VolumeBorder::closed);
+      EXPECT_EQ(defects.components, border == VolumeBorder::closed ? 1 : 2);
+      EXPECT_EQ(defects.isolated_vertices + defects.non_manifold_vertices, 0);
+      const Mat3 steps = axes.cwiseAbs();
+      const Vec3 voxel = steps.rowwise().sum();
+      Vec3 margin;  // a voxel where the block is along the axis, else the nearest that a vertex is
+      for (int axis = 0; axis < 3; ++axis)
+        margin[axis] = voxel[axis] > steps.row(axis).maxCoeff() ? 0.01 : 1;
+      Vec3 least = high, greatest = low;
+      for (const Vec3& p : result.surface.points) {
+        EXPECT_TRUE((p.array() > (low - margin).array()).all() &&
+                    (p.array() < (high + margin).array()).all())
+            << p.transpose();
+        least = least.cwiseMin(p);
+        greatest = greatest.cwiseMax(p);
+      }
+      for (const int axis : {1, 2}) {  // to the sides of the box, but for a voxel
+        EXPECT_LT(least[axis], low[axis] + voxel[axis]);
+        EXPECT_GT(greatest[axis], high[axis] - voxel[axis]);
+      }
+      EXPECT_EQ(result.remarks.size(), axes.isIdentity() ? 1u : 2u);
+    }
+}
+
+TEST(VolumeFilter, a_box_beside_an_oblique_volume_is_refused) {
+  const Mat3 turned = Eigen::AngleAxisd(0.8, Vec3::UnitZ()).toRotationMatrix();
+  Volume volume = sampled(9, turned, [](const Vec3& p) { return p.x(); });
+  EXPECT_NE(refusal([&] {
+              leave_out({5, 5, -4}, {6, 6, 4}, volume);
             }).find("lies beside it"),
             std::string::npos);
 }
