@@ -109,12 +109,19 @@ Pairs read_pairs(const base::Options& options) {
   return pairs;
 }
 
-void print_warnings(const tools::registration::LandmarkFit& fit) {
+void print_warnings(const tools::registration::LandmarkFit& fit, const Pairs& pairs) {
+  constexpr double largest_rms = 5;  // mm, of landmarks placed well on scans of one head
   if (fit.rms_mirrored < 0.3 * fit.rms_all)
     std::printf(
         "  note: a mirror image fits better (rms %.3g against %.3g mm): left and right are "
         "exchanged in one of the files\n",
         fit.rms_mirrored, fit.rms_all);
+  const auto worst = std::max_element(fit.residual.begin(), fit.residual.end());
+  if (fit.rms > largest_rms)
+    std::printf(
+        "  note: rms %.3g mm, expected at most %g mm; %s is farthest off, by %.3g mm: check that "
+        "names are not exchanged and that both are scans of one head\n",
+        fit.rms, largest_rms, pairs.names[worst - fit.residual.begin()].c_str(), *worst);
   const Mat3& r = fit.transform.rotation;
   if (r(0, 0) < -0.9 && r(1, 1) < -0.9)
     std::printf(
@@ -137,7 +144,7 @@ void print(const tools::registration::LandmarkFit& fit, const Pairs& pairs) {
   if (out > 0) std::printf("; %.4g mm of all with none left out", fit.rms_all);
   std::printf("\n");
   if (fit.transform.scale != 1) std::printf("  scale %.6g\n", fit.transform.scale);
-  print_warnings(fit);
+  print_warnings(fit, pairs);
 }
 
 base::Exit refine(const base::Options& options, const surface::Surface& moving,

@@ -89,6 +89,17 @@ def test_registration_brings_the_mesh_to_its_place_and_back_from_the_file(run, p
     assert np.abs(stored - pair.back(pair.fixed.points)).max() < 1e-4
 
 
+def test_exchanged_names_of_landmarks_are_noted(run, pair):
+    assert "note: rms" not in run(*REGISTER, "-output", "found").stdout
+    names = [NAMES[1], NAMES[0], *NAMES[2:]]
+    (pair.folder / "fixed.mrk.json").write_text(markups(pair.landmarks, names=names))
+    result = run(*REGISTER, "-output", "found")
+    assert (result.returncode, result.stderr) == (0, ""), result
+    residuals = {name: float(mm) for name, mm in re.findall(r"^  (\w+) +([\d.]+) mm", result.stdout, re.M)}
+    noted = re.search(r"note: rms \S+ mm, expected at most 5 mm; (\w+) is farthest off, by (\S+) mm", result.stdout)
+    assert noted[1] == max(residuals, key=residuals.get) and float(noted[2]) == pytest.approx(max(residuals.values()), rel=0.01)
+
+
 def test_a_bad_landmark_is_named_and_icp_mends_the_rest(run, pair):
     rng = np.random.default_rng(1)
     noisy = pair.landmarks + rng.normal(0, 0.8, (5, 3))
