@@ -154,18 +154,20 @@ std::string describe_reactions(const std::vector<std::vector<int64_t>>& held,
 std::string describe_pierced(const std::vector<std::string>& bodies, const solve::Summary& s) {
   std::string text;
   if (bodies.empty()) return text;  // rank 0 has their names
+  const auto noun = [](int64_t columns) { return columns == 1 ? "column" : "columns"; };
   if (s.pierced.columns > 0)
     text += report_row(
         "pierced by bone",
-        "{} columns, between their two deepest points, up to {:.1f} mm deep, the deepest "
+        "{} {}, between the two deepest points of each, up to {:.1f} mm deep, the deepest "
         "by {} at {:.1f} mm; use a finer skin (tissue.edge) or move less",
-        s.pierced.columns, s.pierced.depth, bodies[s.pierced.body], s.pierced.where);
+        s.pierced.columns, noun(s.pierced.columns), s.pierced.depth, bodies[s.pierced.body],
+        s.pierced.where);
   const solve::PiercedColumns& by = s.pierced_by_instrument;
   if (by.columns > 0)
     text += report_row("pierced by instrument",
-                       "{} columns, up to {:.1f} mm deep, the deepest by {} at {:.1f} mm; push it "
+                       "{} {}, up to {:.1f} mm deep, the deepest by {} at {:.1f} mm; push it "
                        "less far, use a finer skin (tissue.edge) or, where it slides, skin: stick",
-                       by.columns, by.depth, bodies[by.body], by.where);
+                       by.columns, noun(by.columns), by.depth, bodies[by.body], by.where);
   return text;
 }
 

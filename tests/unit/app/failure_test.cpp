@@ -31,6 +31,17 @@ TEST(Failure, NamesOptionsThatMayStopTheSearchShort) {
   EXPECT_FALSE(names("-ksp_max_it 1")) << "a time limit";
 }
 
+TEST(Failure, CountsOneColumnInTheSingular) {
+  solve::Summary summary;
+  const auto text = [&](int64_t columns) {
+    summary.pierced.columns = summary.pierced_by_instrument.columns = columns;
+    return describe_pierced({"mandible"}, summary);
+  };
+  EXPECT_EQ(text(1).find("columns"), std::string::npos) << text(1);
+  EXPECT_NE(text(1).find(" 1 column, "), std::string::npos) << text(1);
+  EXPECT_NE(text(2).find(" 2 columns, "), std::string::npos) << text(2);
+}
+
 /// Advice about springs is given to springs only: in the remark on a hard path, and where the rest
 /// position depends on it.
 TEST(Advice, IsOfTheTissueOfTheScene) {
