@@ -172,14 +172,19 @@ std::vector<Vec3> mirrored(const FrontMap& skin, const std::vector<Vec3>& crease
   return points;
 }
 
-/// Continues a crease that ends nearer to the midline than the corners of a mouth can be.
-void extend(const FrontMap& skin, LipCrease& crease) {
-  constexpr double even = 0.7, nearest = 15;  // of the other side; mm
+/// Puts the ends of a crease where corners of a mouth can be: one that ends nearer to the midline
+/// is continued, and one that runs on farther is cut off.
+void bound(const FrontMap& skin, LipCrease& crease) {
+  constexpr double even = 0.7, nearest = 15;   // of the other side; mm
+  constexpr double farthest = 34, usual = 25;  // mm
   std::vector<Vec3>& points = crease.points;
   const double right = -points.front().x(), left = points.back().x();
-  const double half = std::max({right, left, nearest});
-  if (std::min(right, left) >= even * half) return;
+  const auto [narrow, wide] = std::minmax(right, left);
+  const bool one_fits = narrow >= nearest && narrow <= farthest;
+  const double half = wide <= farthest ? std::max(wide, nearest) : one_fits ? narrow : usual;
+  if (narrow >= even * half && wide <= half) return;
   crease.lost = {right, left};
+  std::erase_if(points, [&](const Vec3& point) { return std::abs(point.x()) > half; });
   const auto on_the_right = mirrored(skin, points, points.front(), half),
              on_the_left = mirrored(skin, points, points.back(), half);
   points.insert(points.begin(), on_the_right.rbegin(), on_the_right.rend());
@@ -219,7 +224,7 @@ LipCrease follow_crease(const FrontMap& skin, double z, const std::optional<Vec3
                         const std::optional<Vec3>& left) {
   const auto gap = middle_gap(skin, z);
   LipCrease crease = gap ? follow_gap(skin, *gap) : follow_touching(skin, z, right, left);
-  if (!right && !left && !crease.points.empty()) extend(skin, crease);
+  if (!right && !left && !crease.points.empty()) bound(skin, crease);
   return crease;
 }
 

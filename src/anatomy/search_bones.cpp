@@ -37,6 +37,32 @@ std::optional<Vec3> tooth_edge(const FrontMap& map, int sign, const ProfilePoint
   return edge;
 }
 
+/// Remarks on a chin beside the midsagittal plane: the median over its heights of the middle of
+/// what lies no farther back than `arch` behind its foremost place.
+void remark_aside(const FrontMap& map, double low, Search& search) {
+  constexpr double above = 4, height = 12, half = 30, arch = 8;  // mm
+  constexpr double largest = 4;                                  // mm, that a head may have
+  std::vector<double> middles;
+  for (double z = low + above; z <= low + above + height; z += map.spacing()) {
+    const auto front = map.foremost(0, z, half);
+    double right = half, left = -half;
+    for (double x = -half; x <= half; x += map.spacing()) {
+      const auto depth = map.depth(x, z);
+      if (!front || !depth || *depth > *front + arch) continue;
+      right = std::min(right, x);
+      left = std::max(left, x);
+    }
+    if (left > right) middles.push_back((left + right) / 2);
+  }
+  if (middles.empty()) return;
+  const double aside = base::median(std::move(middles));
+  if (std::abs(aside) <= largest) return;
+  search.remark(fmt::format(
+      "the chin lies {:.0f} mm {} of the midsagittal plane by the condyles, in which its landmarks "
+      "are put: check them, and give the true ones (-landmarks)",
+      std::abs(aside), aside > 0 ? "left" : "right"));
+}
+
 void search_symphysis(const FrontMap& map, const ScanEnd& end, Search& search) {
   constexpr double cut = 3;  // mm
   const auto profile = map.profile(map.low_z(), map.high_z(), midline);
@@ -51,6 +77,7 @@ void search_symphysis(const FrontMap& map, const ScanEnd& end, Search& search) {
     return lacks("MANDIBLE is cut off flat at the chin, where the scan ends");
   search.put("menton_bone", lowest);
   const auto menton = *search.find("menton_bone");
+  remark_aside(map, menton.z(), search);
   if (const auto edge = tooth_edge(map, 1, {front + 6, menton.z() + 5}, map.high_z(), 12))
     search.put("lower_incisor_edge", *edge);
   const auto edge = search.profile_point("lower_incisor_edge");

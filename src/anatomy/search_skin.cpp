@@ -55,14 +55,12 @@ double search_mouth(const FrontMap& skin, Search& search) {
   search.put("mouth_right", crease.points.front());
   search.put("mouth_left", crease.points.back());
   if (crease.lost)
-    search.remark(
-        fmt::format("the crease between the lips is lost {:.0f} mm right and {:.0f} mm left of the "
-                    "midline; the "
-                    "corners of the mouth are put {:.0f} mm right and {:.0f} mm left of it: check "
-                    "them, and give "
-                    "the true ones (-landmarks)",
-                    (*crease.lost)[0], (*crease.lost)[1], -crease.points.front().x(),
-                    crease.points.back().x()));
+    search.remark(fmt::format(
+        "the crease between the lips ends {:.0f} mm right and {:.0f} mm left of the "
+        "midline, where the corners of the mouth cannot be; they are put {:.0f} mm right "
+        "and {:.0f} mm left of it: check them, and give the true ones (-landmarks)",
+        (*crease.lost)[0], (*crease.lost)[1], -crease.points.front().x(),
+        crease.points.back().x()));
   if (crease.open)
     search.remark(fmt::format(
         "the mouth is open in SKIN, by up to {:.1f} mm: stomion and corners are those of the gap",

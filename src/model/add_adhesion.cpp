@@ -10,9 +10,10 @@
 namespace repose::model {
 namespace {
 
-constexpr double crown = 11;   // mm, of an incisor, from its edge
-constexpr double rough = 0.6;  // mm, by which mucosa may end farther from teeth than the gap
-constexpr double range = 2;    // mm off the plane, for 1/√2 of the largest tension
+constexpr double crown = 11;       // mm, of an incisor, from its edge
+constexpr double rough = 0.6;      // mm, by which mucosa may end farther from teeth than the gap
+constexpr double on_tooth = 1e-6;  // mm: nearer points have no direction off the tooth
+constexpr double range = 2;        // mm off the plane, for 1/√2 of the largest tension
 
 /// z of the line between the lips at x, along the head's axes: through stomion and the corners of
 /// the mouth.
@@ -43,7 +44,7 @@ class JawAdhesion {
     if ((above.z() > lip_line(rule_, above.x())) != jaw_.upper) return;
     if ((at.array() < jaw_.low.array()).any() || (at.array() > jaw_.high.array()).any()) return;
     const auto tooth = tree_.nearest(x[point], jaw_.reach * jaw_.reach);
-    if (tooth.triangle < 0 || !(tooth.squared > 0)) return;
+    if (tooth.triangle < 0 || tooth.squared <= on_tooth * on_tooth) return;
     const Vec3 normal = (x[point] - tooth.point).normalized();
     elements.points.push_back(point);
     elements.numbers.insert(

@@ -126,13 +126,36 @@ double gap_between(const BoneGroup& lower, const Anatomical& head) {
   return gap;
 }
 
+double middle_along(const Vec3& direction, const BoneGroup& bones) {
+  double low = std::numeric_limits<double>::infinity(), high = -low;
+  for (const Vec3& x : bones.points) {
+    low = std::min(low, direction.dot(x));
+    high = std::max(high, direction.dot(x));
+  }
+  return (low + high) / 2;
+}
+
+/// Returns how far the middle of the jaw lies beside that of the skull, mm: along the axis of the
+/// coordinates, across where the skin faces, or along the axis by landmarks, the least of them, for
+/// heads may be turned.
+double middles_apart(const Anatomical& head) {
+  const HeadDirections& frame = *head.directions;
+  std::vector<Vec3> lefts{frame.left, frame.up.cross(frame.facing).normalized()};
+  if (head.scene.anatomy) lefts.emplace_back(head.scene.anatomy->axes.row(0));
+  double least = std::numeric_limits<double>::infinity();
+  for (const Vec3& left : lefts)
+    least =
+        std::min(least, std::abs(middle_along(left, head.lower) - middle_along(left, head.upper)));
+  return least;
+}
+
 std::string check_fit(const Anatomical& head) {
-  const double aside = head.directions->left.dot(head.lower.box.center() - head.upper.box.center());
+  const double aside = middles_apart(head);
   const std::string jaw = names_of(head, BoneRole::lower), skull = names_of(head, BoneRole::upper);
   constexpr const char* remedy = "check that both come from one scan and in one frame";
-  if (std::abs(aside) > out_of_middle)
-    return fmt::format("the middle of {} lies {:.0f} mm beside that of {}; {}", jaw,
-                       std::abs(aside), skull, remedy);
+  if (aside > out_of_middle)
+    return fmt::format("the middle of {} lies {:.0f} mm beside that of {}; {}", jaw, aside, skull,
+                       remedy);
   const double gap = gap_between(head.lower, head);
   if (gap > apart)
     return fmt::format("{} comes no nearer to {} than {:.0f} mm; {}", jaw, skull, gap, remedy);

@@ -66,6 +66,18 @@ def test_noise_moves_a_flat_nasion_little(run, tmp_path):
     assert np.linalg.norm(np.subtract(found[1:], found[0]), axis=1).max() < 1.5
 
 
+@pytest.mark.parametrize("aside, remarked", [(0, False), (2, False), (-6, True), (8, True)])
+def test_a_chin_beside_the_midline_is_reported(run, tmp_path, aside, remarked):
+    surfaces = turned(tmp_path, f"{MESHES}/head_", np.eye(3))
+    jaw = meshio.read(tmp_path / "mandible.ply")
+    behind = jaw.points[:, 1].max() - jaw.points[:, 1]
+    jaw.points[:, 0] += aside * behind / behind.max()
+    jaw.write(tmp_path / "mandible.ply")
+    result = run("repose-landmarks", *surfaces)
+    line = rf"the chin lies [5-8] mm {'left' if aside > 0 else 'right'} of the midsagittal plane"
+    assert result.returncode == 0 and bool(re.search(line, result.stdout)) == remarked, result.stdout
+
+
 @pytest.mark.parametrize("change, line", [
     (np.diag([-1, -1, 1]), "as in RAS"),
     (np.diag([-1, 1, -1]), "left, back, up lie along -x, +y, -z"),

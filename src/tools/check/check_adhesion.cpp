@@ -124,6 +124,7 @@ std::vector<Film> find_films(const Model& model) {
   const std::map<int64_t, int64_t> skin = skin_points(model);
   const model::ContactPairs& pairs = model.contact.pairs;
   std::vector<Film> films;
+  constexpr double on_tooth = 1e-6;  // mm
   for (const AdhesionRule::Jaw& jaw : rule.jaws) {
     const TriangleGrid teeth(model.bone_surfaces[jaw.bone]);
     for (size_t c = 0; c < pairs.point.size(); ++c) {
@@ -140,7 +141,7 @@ std::vector<Film> find_films(const Model& model) {
       const std::optional<Vec3> tooth = teeth.closest_point(at, jaw.reach);
       if (!tooth || teeth.contains(at)) continue;
       const double distance = (at - *tooth).norm();
-      if (!(distance > 0)) continue;
+      if (distance <= on_tooth) continue;
       films.push_back(
           {i, jaw.bone, (at - *tooth) / distance, distance, rule.tension * pairs.area[c]});
     }

@@ -45,8 +45,9 @@ std::array<std::array<double, 4>, 2> spline_weights(double t) {
 struct AtPoint {
   double gap = considered;  // mm, the smaller of the next two
   double body_gap = considered, wall_gap = considered;
-  int32_t body = -1;              // that it is to; −1: the side of a cut
-  std::vector<int32_t> pressing;  // bodies that may press
+  double other_wall_gap = considered;  // where the nearest place of a side is one of two
+  int32_t body = -1;                   // that it is to; −1: the side of a cut
+  std::vector<int32_t> pressing;       // bodies that may press
   bool slides = false, mesh = false, wall = false;
   double area = 0;  // mm², that the point stands for
 };
@@ -190,9 +191,10 @@ void add_cut_faces(const model::Model& model, const std::vector<Vec3>& position,
   for (const int64_t p : model.contact.cut_faces.point) truth.points[p].wall = true;
   for (const CutGap& at : cut_gaps(model.contact.cut_faces, position)) {
     AtPoint& point = truth.points[at.point];
-    if (at.gap < point.gap) point.body = -1;
-    point.gap = std::min(point.gap, at.gap);
-    point.wall_gap = std::min(point.wall_gap, at.gap);
+    if (at.gap[0] < point.gap) point.body = -1;
+    point.gap = std::min(point.gap, at.gap[0]);
+    point.wall_gap = std::min(point.wall_gap, at.gap[0]);
+    point.other_wall_gap = std::min(point.other_wall_gap, at.gap[1]);
   }
 }
 
@@ -305,7 +307,9 @@ void Claims::check_gaps(const std::vector<double>& stated) {
     const bool at_cut = point.wall_gap < point.body_gap - 2 * allowed(point.body_gap);
     if (!point.mesh || at_cut) {
       gaps.push_back(stated[i]);
-      again.push_back(point.gap);
+      const double other = std::min(point.body_gap, point.other_wall_gap);
+      const bool is_other = std::abs(stated[i] - other) < std::abs(stated[i] - point.gap);
+      again.push_back(is_other ? other : point.gap);
     } else if (!explained(static_cast<int64_t>(i), stated[i])) {
       worst.offer(std::abs(stated[i] - point.gap), [&] {
         return fmt::format(

@@ -94,9 +94,10 @@ Parameters nearest_whole(const Side& side, const Vec3& place) {
 }
 
 /// Parameters at which the distance to `place` is least, from `at` on: steps to the best of eight
-/// neighbors, halved where none is nearer.
-Parameters descend(const Side& side, const Vec3& place, Parameters at) {
-  constexpr double first = 0.25, last = 1e-7;
+/// neighbors, halved where none is nearer. Of several minima, `first` steps that are long may reach
+/// another one than those that are short.
+Parameters descend(const Side& side, const Vec3& place, Parameters at, double first) {
+  constexpr double last = 1e-7;
   double minimum = (side.point(at) - place).squaredNorm();
   for (double step = first; step > last;) {
     Parameters best = at;
@@ -114,9 +115,9 @@ Parameters descend(const Side& side, const Vec3& place, Parameters at) {
   return at;
 }
 
-double signed_gap(const Side& side, const Vec3& place) {
+double gap_from(const Side& side, const Vec3& place, const Parameters& start, double first) {
   constexpr double at_end = 1e-6;
-  const Parameters foot = descend(side, place, nearest_whole(side, place));
+  const Parameters foot = descend(side, place, start, first);
   const Vec3 offset = place - side.point(foot);
   const auto [along, inwards] = side.slopes(foot);
   const Vec3 normal = along.cross(inwards);
@@ -138,7 +139,9 @@ std::vector<CutGap> cut_gaps(const model::CutFaces& cuts, std::span<const Vec3> 
     for (size_t c = 0; c < count; ++c, ++place) {
       if (!(cuts.area[place] > 0)) continue;
       const Vec3 at = own.point({c / rows, c % rows});
-      gaps.push_back({cuts.point[cuts.begin[first + c]], signed_gap(other, at)});
+      const Parameters start = nearest_whole(other, at);
+      gaps.push_back({cuts.point[cuts.begin[first + c]],
+                      {gap_from(other, at, start, 1.0 / 4), gap_from(other, at, start, 1.0 / 32)}});
     }
     first += 2 * count;
   }

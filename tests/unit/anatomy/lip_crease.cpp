@@ -71,6 +71,21 @@ TEST(LipCrease, ASideOnWhichItIsLostIsFollowedAsFarAsTheOther) {
   EXPECT_FALSE(follow_crease(map, -3, Vec3(-20, 0, -3), Vec3(20, 0, -3)).lost);
 }
 
+TEST(LipCrease, ASideThatRunsOnEndsWhereACornerOfTheMouthCanBe) {
+  for (const double left : {24.0, 48.0}) {
+    surface::Surface skin;
+    add(skin, 0, {-60, -2}, {60, 40});
+    add(skin, 0, {-60, -60}, {60, -4});
+    add(skin, 3, {-60, -4}, {left, -2});
+    add(skin, 0, {left, -4}, {60, -2});
+    const LipCrease crease = follow_crease(FrontMap(skin, HeadFrame{}), -3, {}, {});
+    ASSERT_TRUE(crease.lost);
+    EXPECT_NEAR((*crease.lost)[0], 45, 1);
+    EXPECT_NEAR(crease.points.front().x(), left < 34 ? -24 : -25, 1);
+    EXPECT_NEAR(crease.points.back().x(), left < 34 ? 24 : 25, 1);
+  }
+}
+
 TEST(LipCrease, KnownCornersLeadWhereThereIsNoCrease) {
   surface::Surface skin;
   add(skin, 0, {-50, -60}, {50, 40});

@@ -39,7 +39,7 @@ TEST(CutGaps, AreSignedDistancesBetweenPlaneSides) {
         [](int i, int j) { return Vec3(2 * i, 3 * j, 0); });
     const std::vector<CutGap> gaps = cut_gaps(cuts, position);
     ASSERT_EQ(gaps.size(), columns * (rows - 1));
-    for (const CutGap& at : gaps) EXPECT_NEAR(at.gap, distance, 1e-9);
+    for (const CutGap& at : gaps) EXPECT_NEAR(at.gap[0], distance, 1e-9);
     EXPECT_EQ(gaps.front().point, 1);
   }
 }
@@ -50,7 +50,7 @@ TEST(CutGaps, AreDistancesWhereNothingIsOpposite) {
       cuts, [](int i, int j) { return Vec3(i + 20, j, 1); },
       [](int i, int j) { return Vec3(i, j, 0); });
   for (const CutGap& at : cut_gaps(cuts, position))
-    EXPECT_NEAR(at.gap, std::hypot(position[at.point].x() - columns, 1), 1e-9);
+    EXPECT_NEAR(at.gap[1], std::hypot(position[at.point].x() - columns, 1), 1e-9);
 }
 
 TEST(CutGaps, AreThoseOfTheSolverBetweenBentSides) {
@@ -71,10 +71,30 @@ TEST(CutGaps, AreThoseOfTheSolverBetweenBentSides) {
   ASSERT_EQ(gaps.size(), solver.size());
   int behind = 0;
   for (size_t w = 0; w < gaps.size(); ++w) {
-    EXPECT_NEAR(gaps[w].gap, solver.gap(w), 1e-8) << w;
-    behind += gaps[w].gap < 0;
+    EXPECT_NEAR(gaps[w].gap[0], solver.gap(w), 1e-8) << w;
+    behind += gaps[w].gap[0] < 0;
   }
   EXPECT_GT(behind, 0);
+}
+
+TEST(CutGaps, AreThoseOfTheNearestOfTwoMinima) {
+  for (const unsigned rough : {15, 79, 173, 371, 373}) {
+    std::mt19937 random(rough);
+    std::uniform_real_distribution<double> off(-0.35, 0.35);
+    const auto place = [&](double i, double j, double z) -> Vec3 {
+      return Vec3(i, j, z) + Vec3(off(random), off(random), off(random));
+    };
+    model::CutFaces cuts;
+    const auto position = lay(
+        cuts, [&](int i, int j) { return place(i + 0.4, j - 0.2, 1); },
+        [&](int i, int j) { return place(i, j, 0); });
+    mechanics::CutFaceContact solver(cuts, 1);
+    solver.update_gaps(position);
+    const std::vector<CutGap> gaps = cut_gaps(cuts, position);
+    ASSERT_EQ(gaps.size(), solver.size());
+    for (size_t w = 0; w < gaps.size(); ++w)
+      EXPECT_NEAR(gaps[w].gap[1], solver.gap(w), 1e-8) << rough << ", " << w;
+  }
 }
 
 TEST(CutGaps, AreThoseOfTheSolverBeyondTheEndsOfASkewSide) {
@@ -96,7 +116,7 @@ TEST(CutGaps, AreThoseOfTheSolverBeyondTheEndsOfASkewSide) {
     const std::vector<CutGap> gaps = cut_gaps(cuts, position);
     ASSERT_EQ(gaps.size(), solver.size());
     for (size_t w = 0; w < gaps.size(); ++w)
-      EXPECT_NEAR(gaps[w].gap, solver.gap(w), 1e-7) << w << " of seed " << seed;
+      EXPECT_NEAR(gaps[w].gap[0], solver.gap(w), 1e-7) << w << " of seed " << seed;
   }
 }
 
