@@ -35,6 +35,7 @@ TEST(Failure, CountsOneColumnInTheSingular) {
   solve::Summary summary;
   const auto text = [&](int64_t columns) {
     summary.pierced.columns = summary.pierced_by_instrument.columns = columns;
+    summary.pierced.body = summary.pierced_by_instrument.body = 0;
     return describe_pierced({"mandible"}, summary);
   };
   EXPECT_EQ(text(1).find("columns"), std::string::npos) << text(1);
