@@ -11,7 +11,8 @@ from sheet.shown_skin import matching_rows, opened, read_given, read_places, rea
 
 # Rows of the summary of repose-solve that the page repeats, and words that only those have that warn
 CAUTIONS = {"warning": "", "other rest position": "", "pierced by bone": "", "pierced by instrument": "",
-            "skin on bone": "", "exact penetration": "points are deeper", "self-contact": "", "path": "DEPENDS"}
+            "skin on bone": "", "exact penetration": "points are deeper", "bone through skin": "", "self-contact": "",
+            "path": "DEPENDS"}
 PLACE = re.compile(r"(?:at|about) \((\S+), (\S+), (\S+)\)(?: mm)?")
 
 

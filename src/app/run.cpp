@@ -12,6 +12,7 @@
 #include <limits>
 #include <optional>
 
+#include "bone_through_skin.h"
 #include "movement.h"
 #include "phase.h"
 #include "plan_pieces.h"
@@ -331,10 +332,13 @@ base::Exit Run::solve() {
   stages_.end("write");
   const std::optional<PathCheck> path = verify(summary, writer);
   const std::string sensitivity = describe_sensitivity(summary, writer);
-  std::string answer, self_contact;
+  std::string answer, skin_report;
   base::on_root(comm, [&] {
     answer = describe_answer(skin, now, summary, writer);
-    if (summary.path.complete()) self_contact = skin.describe_self_contact(now);
+    if (summary.path.complete())
+      skin_report =
+          describe_bone_through_skin(skin.initial(), now, job_.local_model.global_metadata) +
+          skin.describe_self_contact(now);
   });
   const std::string text =
       answer + folds +
@@ -345,7 +349,7 @@ base::Exit Run::solve() {
       writer.comparison() + sensitivity + describe_tearing(tearing) +
       describe_tangents(writer.point_fields()) + (path ? describe_path(*path) : "") +
       writer.reactions() + describe_contact(job_.bodies, summary) +
-      describe_pierced(job_.bodies, summary) + self_contact +
+      describe_pierced(job_.bodies, summary) + skin_report +
       report_row("result", "{}.h5, {}_*.xdmf (ParaView)", name_, name_) + given;
   print(text);
   base::on_root(comm, [&] { results::add_summary(name_ + ".h5", text); });
