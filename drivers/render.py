@@ -35,7 +35,7 @@ import shutil
 import sys
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from sheet.script import (Arguments, Unusable, number_from, reading, refuse,  # noqa: E402
+from sheet.script import (Arguments, Unusable, number_from, own_names, reading, refuse,  # noqa: E402
                           refuse_missing, result_name, run)
 from sheet.whole_file import Target  # noqa: E402
 
@@ -636,7 +636,9 @@ def main():
     chosen = arguments()
     find_screen()
     load_modules()
-    results = [Result(name + ".h5", chosen.solved_skin) for name in chosen.names]
+    results = [Result(file + ".h5", chosen.solved_skin) for file in chosen.names]
+    for result, name in zip(results, own_names(chosen.names)):
+        result.name = name
     if chosen.scene:
         for result in results:
             result.instruments = read_instruments(chosen.scene)

@@ -17,7 +17,7 @@ import os
 import pathlib
 import re
 
-from sheet.script import Arguments, reading, refuse, refuse_missing, result_name, run
+from sheet.script import Arguments, own_names, reading, refuse, refuse_missing, result_name, run
 from sheet.whole_file import Target
 
 try:
@@ -77,8 +77,8 @@ def main():
     if appearance and appearance.skin is not results[0].skin:
         appearance.skin.turn(axes)
     marks = {name: axes @ place for name, place in marks.items()}
-    plans = [page.Plan(page.title_of(name), result, marks, norms)
-             for name, result in zip(chosen.names, results)]
+    plans = [page.Plan(page.spoken(name), result, marks, norms)
+             for name, result in zip(own_names(chosen.names), results)]
     chosen.output.write(page.write(plans, norms, chosen.scene, appearance, frame))
     print(chosen.output)
 

@@ -34,13 +34,20 @@ def read_norms(file):
 # ----- measures
 
 
-def angle(one, corner, other):
+def in_profile(*points):
+    """Points as a lateral film shows them: in the midsagittal plane."""
+    return [point * (0, 1, 1) for point in points]
+
+
+def angle(*points):
+    one, corner, other = in_profile(*points)
     a, b = one - corner, other - corner
     return math.degrees(math.acos(np.clip(a @ b / np.linalg.norm(a) / np.linalg.norm(b), -1, 1)))
 
 
-def in_front(point, one, other):
+def in_front(*points):
     """How far a point is in front of the line through two others, mm; negative behind it."""
+    point, one, other = in_profile(*points)
     line = (other - one) / np.linalg.norm(other - one)
     off = point - one
     off = off - (off @ line) * line
@@ -86,7 +93,7 @@ MEASURES = {
                              ("glabella", "subnasale", "menton"),
                              lambda g, sn, me: ratio(g[2] - sn[2], sn[2] - me[2])),
     "lower face": ("mm", "subnasale to menton", ("subnasale", "menton"),
-                   lambda sn, me: float(np.linalg.norm(sn - me))),
+                   lambda sn, me: float(np.linalg.norm(np.subtract(*in_profile(sn, me))))),
     "lower face–throat angle": ("°", "subnasale–gnathion–throat",
                                 ("subnasale", "gnathion", "throat"), angle),
     "upper lip to chin and lower lip": (

@@ -234,6 +234,11 @@ def numbers(plans):
     return f'<div class="numbers">{"".join(cards)}</div>'
 
 
+def spoken(name):
+    """The name of a file or bone in words."""
+    return name.replace("_", " ")
+
+
 def moved_bones(plan):
     """[(name, place, shift there, rotation)] of the bones that move."""
     marks = {name: mark for name, others in BONES.items() for mark in plan.placed
@@ -244,7 +249,7 @@ def moved_bones(plan):
         place, point = reference(bone, marks)
         step = turn @ point + shift - point
         if np.linalg.norm(bone["after"] - bone["before"], axis=1).max() > 0.005:
-            found.append((bone["name"].replace("_", " "), place, step, turn))
+            found.append((spoken(bone["name"]), place, step, turn))
     return found
 
 
@@ -268,8 +273,8 @@ def plan_table(plans, frame):
             "yaw, °")
     page = table(("plan", *head) if len(plans) > 1 else head, rows) if rows else \
         "<p>No bone moves.</p>"
-    still = sorted({bone["name"] for plan in plans for bone in plan.result.bones} -
-                   {row[0] for plan in plans for row in moved_bones(plan)})
+    still = sorted({spoken(bone["name"]) for plan in plans for bone in plan.result.bones} -
+                   {name for plan in plans for name, *_ in moved_bones(plan)})
     if still:
         page += f'<p class="note">Does not move: {html.escape(", ".join(still))}. '
     else:
@@ -464,8 +469,4 @@ def write(plans, norms, scene, appearance, frame):
 """
 
 
-def title_of(name):
-    return os.path.basename(name).replace("_", " ")
-
-
-__all__ = ["BEYOND", "Plan", "title_of", "write"]
+__all__ = ["BEYOND", "Plan", "spoken", "write"]

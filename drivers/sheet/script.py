@@ -111,6 +111,15 @@ def number_from(low, high, kind=int):
     return read
 
 
+def own_names(files):
+    """The names of results without their folders; with the folder each is in where these are alike."""
+    names = [os.path.basename(file) for file in files]
+    if len(set(names)) == len(names):
+        return names
+    return [os.path.join(os.path.basename(os.path.dirname(os.path.abspath(file))), name)
+            for file, name in zip(files, names)]
+
+
 def result_name(text):
     """The path of a result without its ending, which may be left out. Refuses one that is not there."""
     name = text[:-len(".h5")] if text.lower().endswith(".h5") else text

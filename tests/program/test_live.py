@@ -33,6 +33,16 @@ def distance(one, other):
     return np.linalg.norm(one.position - other.position, axis=1).max()
 
 
+def test_the_program_of_the_named_build_is_taken(monkeypatch, tmp_path):
+    monkeypatch.delenv("REPOSE_LIVE", raising=False)
+    monkeypatch.setenv("REPOSE_BUILD", str(tmp_path))
+    with pytest.raises(FileNotFoundError, match="REPOSE_BUILD"):
+        repose.session.find_program()
+    (tmp_path / "bin").mkdir()
+    (tmp_path / "bin/repose-live").symlink_to(programs() / "repose-live")
+    assert repose.session.find_program() == str(tmp_path / "bin/repose-live")
+
+
 def test_answers_do_not_depend_on_their_order(session):
     first = session.solve(A)
     other = session.solve(B)

@@ -411,7 +411,8 @@ def test_landmarks_and_angles_are_right(report, opened, tmp_path):
         x, y, z = sides[1][name] - here[name]
         expected = ["skin", *(f"{v:.2f}" for v in (-y, x, z, math.hypot(x, y, z)))]
         assert page.rows[name.replace("_", " ")] == expected
-    convexity = [180 - corner(p["glabella_soft"], p["subnasale"], p["pogonion_soft"]) for p in sides]
+    profiles = [{name: place * (0, 1, 1) for name, place in p.items()} for p in sides]
+    convexity = [180 - corner(p["glabella_soft"], p["subnasale"], p["pogonion_soft"]) for p in profiles]
     assert page.rows["facial convexity"] == [
         "180° − angle glabella–subnasale–pogonion", "°",
         *tenths(*convexity, convexity[1] - convexity[0]), "13.6 ± 4.2 [1]; 14.7 ± 5.1 [2]"]
@@ -419,7 +420,7 @@ def test_landmarks_and_angles_are_right(report, opened, tmp_path):
     assert page.rows["upper lip to lower lip"][2:4] == tenths(*lips)
     for lip in ("upper", "lower"):
         off = []
-        for p in sides:
+        for p in profiles:
             line = p["pogonion_soft"] - p["pronasale"]
             away = np.cross(p[f"{lip}_lip"] - p["pronasale"], line / np.linalg.norm(line))
             off.append(-np.linalg.norm(away))  # both lips are behind the line

@@ -6,6 +6,7 @@ import resource
 import struct
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -18,9 +19,10 @@ from repose.scene import Scene  # noqa: E402
 from sheet import tables  # noqa: E402
 from sheet.appearance import read_appearance, read_ply  # noqa: E402
 from sheet.landmarks import read_landmarks  # noqa: E402
-from sheet.measures import read_norms  # noqa: E402
+from sheet.measures import MEASURES, read_norms  # noqa: E402
 from sheet.meshes import coarser  # noqa: E402
-from sheet.script import Unusable  # noqa: E402
+from sheet.page import plan_table  # noqa: E402
+from sheet.script import Unusable, own_names  # noqa: E402
 from sheet.shown_skin import Skin, matching_rows, rows_of_patient  # noqa: E402
 from sheet.whole_file import Target  # noqa: E402
 from sheet.words import to_html  # noqa: E402
@@ -187,6 +189,29 @@ def test_damaged_colors_are_refused(tmp_path, body, part):
     (tmp_path / "skin.ply").write_text(COLORED.format("ascii") + body)
     with pytest.raises(Unusable, match=f"skin.ply: damaged, or not a mesh of the skin: .*{part}"):
         read_appearance(tmp_path / "skin.ply", None)
+
+
+def test_measures_of_the_profile_do_not_depend_on_the_side():
+    places = {"glabella": (0, -80, 60), "subnasale": (0, -84, 0), "pronasale": (0, -98, 8), "upper lip": (0, -88, -10),
+              "lower lip": (0, -86, -20), "pogonion": (0, -82, -40)}
+    for name in ("facial convexity", "lower lip in front of the E-line", "lower lip in front of subnasale–pogonion"):
+        _, _, needed, value = MEASURES[name]
+        straight, aside = (value(*(np.add(places[mark], (6 * side * (mark == "pogonion"), 0, 0)) for mark in needed))
+                           for side in (0, 1))
+        assert aside == pytest.approx(straight, abs=1e-9), name
+
+
+def test_a_bone_of_several_words_that_moves_is_no_bone_that_stays():
+    before = np.array([[0.0, 0, 0], [10, 0, 0], [0, 10, 0]])
+    bones = [{"name": name, "before": before, "after": before + shift, "motion": (np.eye(3), np.array(shift))}
+             for name, shift in (("upper_jaw", (0, -5, 0)), ("lower_jaw", (0, 0, 0)))]
+    plan = SimpleNamespace(name="plan", placed=[], bones={}, result=SimpleNamespace(bones=bones))
+    assert "Does not move: lower jaw." in plan_table([plan], "the scan")
+
+
+def test_results_of_one_name_are_told_apart_by_their_folders(tmp_path):
+    assert own_names(["a/face", "b/other"]) == ["face", "other"]
+    assert own_names(["a/face", str(tmp_path / "b/face")]) == ["a/face", "b/face"]
 
 
 def test_no_line_ends_within_a_command():

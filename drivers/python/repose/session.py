@@ -123,16 +123,17 @@ class Face:
 
 
 def find_program():
-    """repose-live: REPOSE_LIVE, else on the PATH, else built in the project around this file."""
+    """repose-live: REPOSE_LIVE, else of REPOSE_BUILD, on the PATH, or built in the project of this file."""
     if "REPOSE_LIVE" in os.environ:
         return absolute_program(os.environ["REPOSE_LIVE"], "set REPOSE_LIVE to repose-live")
-    found = shutil.which("repose-live")
-    for folder in () if found else pathlib.Path(__file__).resolve().parents:
-        built = sorted(folder.glob("build*/bin/repose-live"))
-        if built:
-            return str(built[0])
+    if "REPOSE_BUILD" in os.environ:
+        return absolute_program(os.path.join(os.environ["REPOSE_BUILD"], "bin", "repose-live"),
+                                "set REPOSE_BUILD to the folder that Repose is built in")
+    project = pathlib.Path(__file__).resolve().parents[3]
+    built = map(str, sorted(project.glob("build*/bin/repose-live")))
+    found = shutil.which("repose-live") or next(built, None)
     if not found:
-        raise FileNotFoundError("repose-live is not found: build or install Repose, or set REPOSE_LIVE")
+        raise FileNotFoundError("repose-live is not found: build or install Repose, or set REPOSE_BUILD")
     return os.path.abspath(found)
 
 
