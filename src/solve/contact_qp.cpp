@@ -27,11 +27,13 @@ void ContactQp::begin(Vec displacement, Vec step) {
   check(VecSet(step, 0));
   check(VecSet(force_, 0));
   tangent_.assemble(displacement);
-  std::vector<Mat3> diagonal(solver_.positions().local().size(), Mat3::Zero());
-  tangent_.visit_spd_blocks([&](int32_t p, int32_t q, const Mat3& block) {
-    if (p == q) diagonal[p] += block;
-  });
-  gaps_.stiffen(diagonal);
+  if (diagonal_.empty()) {
+    diagonal_.assign(solver_.positions().local().size(), Mat3::Zero());
+    tangent_.visit_spd_blocks([&](int32_t p, int32_t q, const Mat3& block) {
+      if (p == q) diagonal_[p] += block;
+    });
+  }
+  gaps_.stiffen(diagonal_);
   gaps_.begin();
 }
 

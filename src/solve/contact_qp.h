@@ -38,6 +38,7 @@ class ContactQp {
   ContactGaps gaps_;
   discrete::Tangent& tangent_;
   linear::TangentSolver& solver_;
+  std::vector<Mat3> diagonal_;  // [local points] blocks of H, N/mm, where the first program began
   bool reduced_ = false, settled_ = false;
   base::VecHandle force_, left_, direction_, change_;  // H d, −∇, δ, H δ
 };
