@@ -166,7 +166,7 @@ def test_no_false_alarm_on_other_proportions(run, tmp_path, factors, turn):
 
 def test_a_head_turned_to_the_side_has_a_jaw_in_its_middle(run, tmp_path):
     head = Head(tmp_path)
-    head.change(lambda points: points @ Rotation.from_euler("z", 18, degrees=True).as_matrix().T)
+    head.change(lambda points: points @ Rotation.from_euler("z", 42, degrees=True).as_matrix().T)
     result = run("repose-solve", head.scene(SCENE.replace(OPENING, ADVANCE)), "-dry_run", cwd=tmp_path)
     assert result.returncode == 0 and not any("one scan" in row for row in warnings_of(result)), result
 
