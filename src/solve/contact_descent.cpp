@@ -60,7 +60,7 @@ Outcome ContactDescent::presolve(Vec displacement, double accuracy) {
 
 ContactDescent::End ContactDescent::approach(Vec displacement, double accuracy,
                                              int64_t& iterations) {
-  constexpr double roughly = 0.1, finely = 0.03;  // mm
+  constexpr double roughly = 0.1, finely = 0.004;  // mm
   objective_.contact().round_bodies(true);
   soften();
   const Outcome near = minimizer_.presolve(displacement, std::max(roughly, accuracy), false);

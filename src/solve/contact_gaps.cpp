@@ -68,7 +68,6 @@ void ContactGaps::add_gaps() {
   for (size_t k = 0; k < gaps_.size(); ++k) {
     const auto from = k < touching_ ? bodies.multipliers() : cuts.multipliers();
     state_[k].multiplier = from[gaps_[k].constraint];
-    state_[k].stiffness = stiffness_;
   }
   curvature_.clear(), convex_curvature_.clear();
   const double scale = objective_.weights().elastic;
@@ -96,17 +95,8 @@ void ContactGaps::replace(const LinearGap& by) {
         *blocks, [&](const discrete::Objective::Block& b) { return b.p == point && b.q == point; });
 }
 
-void ContactGaps::stiffen(std::span<const Mat3> blocks) {
-  const double scale = objective_.weights().elastic;
-  for (size_t k = 0; k < gaps_.size(); ++k) {
-    double own = 0;  // N/mm
-    for (const auto& [p, gradient] : gaps_[k].gradient) own += gradient.dot(blocks[p] * gradient);
-    state_[k].stiffness = std::max(stiffness_, own / (scale * gaps_[k].area));
-  }
-}
-
 void ContactGaps::begin() {
-  for (State& state : state_) state = {state.multiplier, state.stiffness};
+  for (State& state : state_) state = {state.multiplier};
 }
 
 bool ContactGaps::choose_active() {
@@ -126,7 +116,7 @@ std::pair<ContactGaps::Blocks, ContactGaps::Blocks> ContactGaps::blocks() const 
   for (size_t k = 0; k < gaps_.size(); ++k) {
     if (!state_[k].active) continue;
     const LinearGap& gap = gaps_[k];
-    const double weight = objective_.weights().elastic * gap.area * state_[k].stiffness;
+    const double weight = objective_.weights().elastic * gap.area * stiffness_;
     mechanics::visit_products(gap.gradient, weight, add_to(blocks.first));
     mechanics::visit_products(gap.lumped.empty() ? gap.gradient : gap.lumped, weight,
                               add_to(blocks.second));
@@ -151,7 +141,7 @@ void ContactGaps::add_forces(Vec to) {
 }
 
 void ContactGaps::add_change_of_forces(Vec to) {
-  add_forces_of([&](size_t k) { return -state_[k].stiffness * state_[k].closing; }, to);
+  add_forces_of([&](size_t k) { return -stiffness_ * state_[k].closing; }, to);
 }
 
 void ContactGaps::set_direction(Vec direction) {
@@ -171,12 +161,12 @@ double ContactGaps::line_search(double slope, double curvature) const {
   for (int n = 0; n < max_pieces; ++n) {
     double sums[2] = {0, 0};
     for (size_t k = 0; k < gaps_.size(); ++k) {
-      const auto& [closing, stiffness] = std::pair(state_[k].closing, state_[k].stiffness);
-      const double now = pressure(k) - share * stiffness * closing;
+      const double closing = state_[k].closing;
+      const double now = pressure(k) - share * stiffness_ * closing;
       if (!gaps_[k].slides && !(now > 0)) continue;
       const double weight = objective_.weights().elastic * gaps_[k].area;
       sums[0] -= weight * now * closing;
-      sums[1] += weight * stiffness * closing * closing;
+      sums[1] += weight * stiffness_ * closing * closing;
     }
     MPI_Allreduce(MPI_IN_PLACE, sums, 2, MPI_DOUBLE, MPI_SUM, objective_.positions().comm());
     const double here = slope + share * curvature + sums[0], bend = curvature + sums[1];
@@ -193,9 +183,14 @@ void ContactGaps::move(double share) {
   for (State& state : state_) state.closed += share * state.closing;
 }
 
-void ContactGaps::move_multipliers() {
-  for (size_t k = 0; k < gaps_.size(); ++k)
-    state_[k].multiplier = gaps_[k].slides ? pressure(k) : std::max(0.0, pressure(k));
+double ContactGaps::move_multipliers() {
+  double maximum = 0;
+  for (size_t k = 0; k < gaps_.size(); ++k) {
+    const double now = gaps_[k].slides ? pressure(k) : std::max(0.0, pressure(k));
+    maximum = std::max(maximum, std::abs(now - state_[k].multiplier));
+    state_[k].multiplier = now;
+  }
+  return base::max_over_ranks(objective_.positions().comm(), maximum / stiffness_);
 }
 
 std::vector<double> ContactGaps::multipliers() const {

@@ -14,7 +14,7 @@ class ContactGaps {
  public:
   explicit ContactGaps(discrete::Objective& objective);
 
-  void set_stiffness(double stiffness) { stiffness_ = stiffness; }  ///< least K, N/mm³
+  void set_stiffness(double stiffness) { stiffness_ = stiffness; }  ///< K, N/mm³
 
   /// Takes the gaps at `displacement`. Collective.
   void linearize(Vec displacement);
@@ -23,9 +23,6 @@ class ContactGaps {
   void linearize(Vec displacement, double load, std::span<const Vec3> travel);
   /// Takes a gap of a body, of this rank, in place of that of the same constraint. Not collective.
   void replace(const mechanics::LinearGap& by);
-  /// Gives each gap a stiffness of its own: at least that of the Hessian's `blocks` on the diagonal
-  /// [local points], N/mm, of its points. Not collective.
-  void stiffen(std::span<const Mat3> blocks);
   /// Leaves the negative part of the gaps' curvature out. Not collective.
   void reduce_curvature() { curvature_ = convex_curvature_; }
 
@@ -51,7 +48,8 @@ class ContactGaps {
   double line_search(double slope, double curvature) const;
   /// d changes by this share of the direction. Not collective.
   void move(double share);
-  void move_multipliers();  ///< to the pressures; not collective
+  /// Takes pressures as multipliers. Returns the largest change, mm of gaps. Collective.
+  double move_multipliers();
 
   std::vector<double> multipliers() const;
   void set_multipliers(const std::vector<double>& to);
@@ -61,7 +59,7 @@ class ContactGaps {
   void add_gaps();
   /// Pressure p − K (g + ∇g · d), N/mm², that acts where it is positive or the point slides.
   double pressure(size_t k) const {
-    return state_[k].multiplier - state_[k].stiffness * (gaps_[k].gap + state_[k].closed);
+    return state_[k].multiplier - stiffness_ * (gaps_[k].gap + state_[k].closed);
   }
   /// Adds the forces of pressures, N/mm², on the active gaps: `of(k)`.
   template <class Pressure>
@@ -69,7 +67,6 @@ class ContactGaps {
 
   struct State {
     double multiplier = 0;    // N/mm²
-    double stiffness = 0;     // K of the gap, N/mm³
     double closed = 0;        // mm, ∇g · d
     double closing = 0;       // mm, ∇g · δ
     signed char active = -1;  // not chosen yet

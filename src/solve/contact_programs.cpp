@@ -40,7 +40,7 @@ bool ContactPrograms::predict(Vec displacement, double load, Vec increment) {
   objective_.hessian_action(travel, trial_, false);
   objective_.add_carried(load, trial_);
   check(VecAXPY(slope_, 1.0, trial_));
-  return qp_.solve(displacement, slope_, predicted_to, ContactQp::Sets::all, increment);
+  return qp_.solve(displacement, slope_, predicted_to, increment);
 }
 
 /// slope_ = gradient_ without its part of contact, at the objective's last update.
@@ -80,7 +80,7 @@ double ContactPrograms::take_step(Vec displacement, double length, double tissue
 }
 
 ContactPrograms::End ContactPrograms::run(Vec displacement, double accuracy, int64_t& iterations,
-                                          ContactQp::Sets sets, int max_steps) {
+                                          int max_steps) {
   constexpr double near = 0.5, finer = 0.1;  // of the accuracy: a step that ends; a program's
   constexpr double at_saddle = 0.05;         // mm: such steps do not leave a saddle
   constexpr double fast = 0.2;               // ratio of full steps that is trusted
@@ -89,16 +89,16 @@ ContactPrograms::End ContactPrograms::run(Vec displacement, double accuracy, int
   for (int n = 0; n < max_steps; ++n) {
     const double tissue = without_contact(value);
     linearize(displacement);
-    if (!qp_.solve(displacement, slope_, finer * accuracy, sets, step_)) return End::failed;
+    if (!qp_.solve(displacement, slope_, finer * accuracy, step_)) return End::failed;
     const double length = discrete::largest_block(step_);
     const double share = take_step(displacement, length, tissue, value);
     if (share == 0) return End::failed;
-    const double before = std::exchange(last_step_, share == 1 && qp_.settled() ? length : 0);
+    const double before = std::exchange(last_step_, share == 1 ? length : 0);
     ++iterations;
     if (qp_.reduced() && length <= at_saddle) return End::failed;
     const bool falls = last_step_ > 0 && last_step_ <= fast * before;
     const double next = falls ? length * length / before : length;
-    if (!qp_.reduced() && qp_.settled() && next <= near * accuracy) return End::reached;
+    if (!qp_.reduced() && next <= near * accuracy) return End::reached;
     if (watch_ && !watch_({iterations, objective_.positions().load(), value,
                            discrete::largest_block(gradient_), length, objective_.evaluations(),
                            displacement}))
@@ -114,7 +114,7 @@ void ContactPrograms::linearize(Vec displacement) {
 
 bool ContactPrograms::step_with(std::span<const mechanics::LinearGap> gaps, Vec displacement) {
   for (const mechanics::LinearGap& gap : gaps) qp_.gaps().replace(gap);
-  if (!qp_.solve(displacement, slope_, predicted_to, ContactQp::Sets::all, step_)) return false;
+  if (!qp_.solve(displacement, slope_, predicted_to, step_)) return false;
   check(VecAXPY(displacement, 1.0, step_));
   return true;
 }

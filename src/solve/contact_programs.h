@@ -21,8 +21,7 @@ class ContactPrograms {
   enum class End { reached, failed, stopped };
   /// Takes steps until one is shorter than half of `accuracy`, or the next would be: full steps
   /// fall by at least the ratio of the latest two. Adds to `iterations`.
-  End run(Vec displacement, double accuracy, int64_t& iterations,
-          ContactQp::Sets sets = ContactQp::Sets::few, int max_steps = 30);
+  End run(Vec displacement, double accuracy, int64_t& iterations, int max_steps = 12);
   /// Returns whether the latest program met negative curvature.
   bool reduced() const { return qp_.reduced(); }
   /// Returns the full step that the latest run ended with, mm, or 0; from then on 0.

@@ -23,32 +23,15 @@ void ContactQp::set_blocks() {
   solver_.preconditioner().update_contact();
 }
 
-void ContactQp::begin(Vec displacement, Vec step) {
-  check(VecSet(step, 0));
-  check(VecSet(force_, 0));
-  tangent_.assemble(displacement);
-  if (diagonal_.empty()) {
-    diagonal_.assign(solver_.positions().local().size(), Mat3::Zero());
-    tangent_.visit_spd_blocks([&](int32_t p, int32_t q, const Mat3& block) {
-      if (p == q) diagonal_[p] += block;
-    });
-  }
-  gaps_.stiffen(diagonal_);
-  gaps_.begin();
-}
-
-/// Minimizes the augmented Lagrangian of the present multipliers: Newton steps on its active sets,
-/// with the least along each.
-bool ContactQp::search(Vec displacement, Vec slope, double tolerance, Sets sets, Vec step) {
-  constexpr int few = 2, all = 30;
+/// Minimizes the augmented Lagrangian of the present multipliers from `step`: Newton steps on its
+/// active sets, with the least along each.
+bool ContactQp::minimize(Vec displacement, Vec slope, double tolerance, Vec step) {
+  constexpr int max_sets = 30;
   constexpr double coarse = 0.1, share_left = 0.1;  // of a linear system; of the step
-  begin(displacement, step);
-  bool full = false;  // the latest step was not shortened
-  settled_ = false;
-  for (int set = 0; set < (sets == Sets::few ? few : all) && !settled_; ++set) {
+  bool full = false;                                // the latest step was not shortened
+  for (int set = 0; set < max_sets; ++set) {
     const bool changed = gaps_.choose_active();
-    settled_ = full && !changed;
-    if (settled_) break;
+    if (full && !changed) return true;
     if (changed) set_blocks();
     check(VecCopy(force_, left_));
     check(VecAXPY(left_, 1.0, slope));
@@ -69,25 +52,40 @@ bool ContactQp::search(Vec displacement, Vec slope, double tolerance, Sets sets,
     check(VecAXPY(force_, share, change_));
     gaps_.move(share);
     const double moved = share * discrete::largest_block(direction_);
-    settled_ = moved <= std::max(tolerance, share_left * discrete::largest_block(step));
+    if (moved <= std::max(tolerance, share_left * discrete::largest_block(step))) return true;
   }
-  gaps_.move_multipliers();
-  return settled_ || sets == Sets::few;
+  return false;
 }
 
-bool ContactQp::solve(Vec displacement, Vec slope, double tolerance, Sets sets, Vec step) {
+/// Rounds of minimizations and new multipliers.
+bool ContactQp::search(Vec displacement, Vec slope, double tolerance, Vec step) {
+  constexpr int max_rounds = 3;  // the next program goes on with the multipliers
+  constexpr double share = 0.1;  // of the step
+  check(VecSet(step, 0));
+  check(VecSet(force_, 0));
+  gaps_.begin();
+  tangent_.assemble(displacement);
+  for (int round = 0; round < max_rounds; ++round) {
+    if (!minimize(displacement, slope, tolerance, step)) return false;
+    const double changed = gaps_.move_multipliers();
+    if (changed <= std::max(tolerance, share * discrete::largest_block(step))) break;
+  }
+  return true;
+}
+
+bool ContactQp::solve(Vec displacement, Vec slope, double tolerance, Vec step) {
   const linear::CgInPlaceOfPreonly cg(solver_.krylov());
   const std::vector<double> multipliers = gaps_.multipliers();
-  bool found = search(displacement, slope, tolerance, sets, step);
+  bool found = search(displacement, slope, tolerance, step);
   reduced_ = !found;
   if (reduced_) {
     gaps_.set_multipliers(multipliers);
     gaps_.reduce_curvature();
-    found = search(displacement, slope, tolerance, sets, step);
+    found = search(displacement, slope, tolerance, step);
   }
   if (!found && tangent_.limit_slopes(true)) {
     gaps_.set_multipliers(multipliers);
-    found = search(displacement, slope, tolerance, sets, step);
+    found = search(displacement, slope, tolerance, step);
     tangent_.limit_slopes(false);
   }
   if (found) gaps_.give_multipliers();

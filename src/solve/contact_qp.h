@@ -9,7 +9,7 @@ namespace repose::solve {
 /// g + Σ ∇g · d ≥ 0 at every gap that is near, = 0 where a point slides (docs/theory/contact.md).
 /// H is the exact Hessian of the tissue and the curvature −a p ∂²g of the gaps' multipliers. An
 /// augmented Lagrangian on an active set: each linear solve, by the tangent solver, is followed by
-/// a new set, the last by new multipliers.
+/// a new set and new multipliers.
 class ContactQp {
  public:
   ContactQp(discrete::Objective& objective, discrete::Tangent& tangent,
@@ -17,29 +17,23 @@ class ContactQp {
 
   ContactGaps& gaps() { return gaps_; }
 
-  enum class Sets { few, all };  ///< the active sets that are taken: two, or until they settle
-
-  /// Minimizes; `slope` is b, `step` receives d, the objective the multipliers. Sets are settled
-  /// where a further one would change d by less than `tolerance` mm, or less than a tenth of d's
-  /// largest 3-vector. Where negative curvature is met, the gaps' curvature is reduced to its
-  /// semidefinite part. Returns whether a minimum, or after a few sets a state of less value, was
-  /// reached. Collective.
-  bool solve(Vec displacement, Vec slope, double tolerance, Sets sets, Vec step);
+  /// Minimizes; `slope` is b, `step` receives d, the objective the multipliers. Stops where a
+  /// further set would change d and the gaps by less than `tolerance` mm, or less than a tenth of
+  /// d's largest 3-vector. Where negative curvature is met, the gaps' curvature is reduced to its
+  /// semidefinite part. Returns whether a minimum was reached. Collective.
+  bool solve(Vec displacement, Vec slope, double tolerance, Vec step);
   /// Returns whether the latest solve met negative curvature.
   bool reduced() const { return reduced_; }
-  /// Returns whether the latest solve ended with a settled set.
-  bool settled() const { return settled_; }
 
  private:
   void set_blocks();
-  void begin(Vec displacement, Vec step);
-  bool search(Vec displacement, Vec slope, double tolerance, Sets sets, Vec step);
+  bool minimize(Vec displacement, Vec slope, double tolerance, Vec step);
+  bool search(Vec displacement, Vec slope, double tolerance, Vec step);
 
   ContactGaps gaps_;
   discrete::Tangent& tangent_;
   linear::TangentSolver& solver_;
-  std::vector<Mat3> diagonal_;  // [local points] blocks of H, N/mm, where the first program began
-  bool reduced_ = false, settled_ = false;
+  bool reduced_ = false;
   base::VecHandle force_, left_, direction_, change_;  // H d, −∇, δ, H δ
 };
 

@@ -80,7 +80,7 @@ void OtherRestSearch::consider_other(Vec displacement, double accuracy, Outcome&
   penalty_.set_multipliers(at_prediction_);
   int64_t iterations = 0;
   bool taken = false;
-  End end = programs_.run(start_, accuracy, iterations, ContactQp::Sets::all);
+  End end = programs_.run(start_, accuracy, iterations);
   if (end == End::failed && !descent_.presolve(start_, accuracy).stopped)
     end = programs_.run(start_, accuracy, iterations);
   if (end == End::reached) {
@@ -127,7 +127,7 @@ OtherRestSearch::End OtherRestSearch::change_side(const OtherSide* side, Vec dis
   if (!programs_.step_with(beyond, start_)) return End::failed;
   if (programs_.evaluate_tissue(start_) > energy_here + promising * work) return End::failed;
   int64_t iterations = 0;
-  End end = programs_.run(start_, accuracy, iterations, ContactQp::Sets::all, 1);
+  End end = programs_.run(start_, accuracy, iterations, 1);
   if (end == End::failed &&
       programs_.evaluate_tissue(start_) <= energy_here + still_promising * work)
     end = programs_.run(start_, accuracy, iterations);
