@@ -126,20 +126,39 @@ def head_axes(landmarks):
 
 def on_surface(before, after, corners, point):
     """The nearest place of a surface before, where it is after, and the distance."""
-    near = np.argsort(((before - point)**2).sum(1))[:8]
-    faces = corners[np.isin(corners, near).any(1)]
-    a, b, c = (before[faces[:, k]] for k in range(3))
-    normal = np.cross(b - a, c - a)
-    area = np.maximum((normal**2).sum(1), 1e-300)
-    weights = np.stack([(np.cross(c - b, point - b) * normal).sum(1) / area,
-                        (np.cross(a - c, point - c) * normal).sum(1) / area,
-                        (np.cross(b - a, point - a) * normal).sum(1) / area], axis=1)
-    weights = np.maximum(weights, 0)
-    weights /= weights.sum(1, keepdims=True)
+    middles = before[corners].mean(1)
+    reach = np.linalg.norm(before[corners] - middles[:, None], axis=2).max(1)
+    away = np.linalg.norm(middles - point, axis=1)
+    faces = corners[away - reach <= away.min()]
+    weights = nearest_weights(before[faces], point)
     places = np.einsum("fk,fkx->fx", weights, before[faces])
     best = np.argmin(((places - point)**2).sum(1))
-    there = weights[best] @ after[faces[best]]
-    return places[best], there, np.linalg.norm(places[best] - point)
+    return places[best], weights[best] @ after[faces[best]], np.linalg.norm(places[best] - point)
+
+
+def nearest_weights(triangles, point):
+    """The weights [n, 3] of corners at the nearest place of each triangle [n, 3, 3]."""
+    found, least = np.zeros((len(triangles), 3)), np.full(len(triangles), np.inf)
+
+    def try_weights(weights, allowed=True):
+        square = ((np.einsum("fk,fkx->fx", weights, triangles) - point)**2).sum(1)
+        closer = allowed & (square < least)
+        found[closer], least[closer] = weights[closer], square[closer]
+
+    a, b, c = triangles.transpose(1, 0, 2)
+    normal = np.cross(b - a, c - a)
+    area = np.maximum((normal**2).sum(1), 1e-300)
+    inside = np.stack([(np.cross(second - first, point - first) * normal).sum(1) / area
+                       for first, second in ((b, c), (c, a), (a, b))], axis=1)
+    try_weights(inside, (inside >= 0).all(1))
+    for first, second in ((0, 1), (1, 2), (2, 0)):
+        side = triangles[:, second] - triangles[:, first]
+        along = ((point - triangles[:, first]) * side).sum(1) / np.maximum((side**2).sum(1), 1e-300)
+        weights = np.zeros((len(triangles), 3))
+        weights[:, second] = np.clip(along, 0, 1)
+        weights[:, first] = 1 - weights[:, second]
+        try_weights(weights)
+    return found
 
 
 def place_landmarks(result, landmarks):
@@ -151,7 +170,7 @@ def place_landmarks(result, landmarks):
         before, after, distance = on_surface(skin.before, skin.after, skin.corners, point)
         best = {"name": name, "on": "skin", "before": before, "after": after}
         for bone in result.bones:
-            away = np.sqrt(((bone["before"] - point)**2).sum(1).min())
+            away = on_surface(bone["before"], bone["before"], bone["corners"], point)[2]
             if away < distance:
                 turn, shift = bone["motion"]
                 distance = away

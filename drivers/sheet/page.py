@@ -85,11 +85,11 @@ def matched(first, second):
     return one.before + (other.after - other.before)[near]
 
 
-def packed_skin(plans, appearance, pack):
-    """The surface of the skin for the page, and its fields."""
+def packed_skin(plans, appearance, others, pack):
+    """The surface of the skin for the page, and its fields; `others`: its vertices after a second plan."""
     result = plans[0].result
     skin = appearance.skin if appearance else result.skin
-    states = [skin.before, skin.after, *([matched(*plans)] if len(plans) == 2 else [])]
+    states = [skin.before, skin.after, *others]
     near = None if skin is result.skin else matching_rows(result.skin, skin)
     unsure = result.uncertainty
     fields = {"solved": skin.solved}
@@ -165,14 +165,15 @@ def same(bone, other):
 def described(plans, appearance):
     """What sheet.js needs, and the packed arrays."""
     pack, solved = Pack(), plans[0].result.solved
-    skin, fields = packed_skin(plans, appearance, pack)
+    others = [matched(*plans)] if len(plans) == 2 else []
+    skin, fields = packed_skin(plans, appearance, others, pack)
     largest = max(float(plan.result.solved.movement.max()) for plan in plans)
     low, high = frame(plans)
     shown = {"surfaces": [skin, *packed_bones(plans, pack)], "fields": fields, "ramp": RAMP,
              "states": state_names(plans), "largest": rounded_up(largest),
              "frame": [float(v) for v in (*low, *high)]}
-    if len(plans) == 2:
-        apart = np.linalg.norm(matched(*plans) - plans[0].result.skin.after, axis=1)
+    if others:
+        apart = np.linalg.norm(others[0] - plans[0].result.skin.after, axis=1)
         shown["apart"] = rounded_up(float(apart.max()))
     return json.dumps(shown), pack.text()
 

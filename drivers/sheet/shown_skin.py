@@ -151,9 +151,12 @@ def matching_rows(skin, other):
             np.allclose(skin.before, other.before, rtol=0, atol=1e-6):
         return np.arange(len(skin.before))
     used = np.unique(skin.corners)
-    _, place, count = np.unique(skin.before[used].round(4), axis=0, return_inverse=True,  # 0.1 µm
-                                return_counts=True)
-    place, found = place.ravel(), nearest(skin.before[used], other.before)
+    both = np.concatenate([skin.before[used], other.before]).round(4)  # 0.1 µm
+    _, first, place = np.unique(both, axis=0, return_index=True, return_inverse=True)
+    found, place = first[place.ravel()[len(used):]], place.ravel()[:len(used)]
+    elsewhere = found >= len(used)
+    found[elsewhere] = nearest(skin.before[used], other.before[elsewhere])
+    count = np.bincount(place)
     sides, other_sides = smoothed(skin)[used], smoothed(other)
     for shared in np.unique(place[found[count[place[found]] > 1]]):
         twins, rows = np.flatnonzero(place == shared), np.flatnonzero(place[found] == shared)

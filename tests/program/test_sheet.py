@@ -18,7 +18,7 @@ import live  # noqa: E402
 from repose.scene import Scene  # noqa: E402
 from sheet import tables  # noqa: E402
 from sheet.appearance import read_appearance, read_ply  # noqa: E402
-from sheet.landmarks import read_landmarks  # noqa: E402
+from sheet.landmarks import on_surface, place_landmarks, read_landmarks  # noqa: E402
 from sheet.measures import MEASURES, read_norms  # noqa: E402
 from sheet.meshes import coarser  # noqa: E402
 from sheet.page import plan_table  # noqa: E402
@@ -94,6 +94,28 @@ def test_equal_skins_are_compared_row_by_row():
 
 
 # ----- landmarks
+
+
+def test_a_landmark_goes_to_the_nearest_place_of_all_triangles():
+    generator = np.random.default_rng(7)
+    places, corners = generator.normal(size=(60, 3)), generator.integers(0, 60, (90, 3))
+    weights = generator.dirichlet([1, 1, 1], 20_000)
+    samples = (weights @ places[corners]).reshape(-1, 3)
+    for point in generator.normal(size=(20, 3)) * 1.5:
+        near, _, distance = on_surface(places, places, corners, point)
+        sampled = np.linalg.norm(samples - point, axis=1).min()
+        assert sampled - 0.02 < distance < sampled + 1e-9
+        assert distance == pytest.approx(np.linalg.norm(near - point))
+
+
+def test_a_landmark_amid_a_large_triangle_of_bone_goes_with_the_bone():
+    corners = np.array([[0, 1, 2]])
+    flat = np.array([[-30.0, 0, 0], [30, 0, 0], [0, 0, 50]])
+    skin = Skin(flat + [0, -9, 0], flat + [0, -9, 0], corners, np.ones(3))
+    bone = {"name": "jaw", "before": flat, "corners": corners, "motion": (np.eye(3), np.array([0, -5, 0]))}
+    result = SimpleNamespace(solved=skin, given=None, bones=[bone])
+    (placed,), lost = place_landmarks(result, {"pogonion": np.array([0, 0.5, 15])})
+    assert placed["on"] == "jaw" and placed["after"].tolist() == [0, -4.5, 15] and not lost
 
 
 MARKUP = '{{"markups": [{{"coordinateSystem": "{}", "controlPoints": [{{"label": "a b", "position": {}}}]}}]}}'
