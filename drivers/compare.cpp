@@ -85,7 +85,12 @@ void print_header() {
               "signed", "mean", "rms", "median", "90 %", "95 %", "max", "% <= 1", "% <= 2");
 }
 
+/// A row of the table; without samples, as of a landmark beyond the skin, their number alone.
 void print_row(const std::string& name, const std::vector<Sample>& samples) {
+  if (samples.empty()) {
+    std::printf("%-28s %10d %8s\n", name.c_str(), 0, "-");
+    return;
+  }
   const auto s = tools::comparison::statistics(samples);
   std::printf("%-28s %10lld %8.4f %8.4f %8.4f %8.4f %8.4f %8.4f %8.4f %8.1f %8.1f\n", name.c_str(),
               static_cast<long long>(s.samples), s.mean_signed, s.mean, s.rms, s.median,

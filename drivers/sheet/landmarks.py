@@ -24,8 +24,8 @@ NAMES = {"glabella": ("glabella_soft", "glabella", "g'"), "nasion": ("nasion_sof
          "menton": ("menton_soft", "soft_menton", "me'"), "throat": ("throat", "cervical_point", "c'")}
 BONES = {"upper incisor": ("upper_incisor_edge", "u1"), "lower incisor": ("lower_incisor_edge", "l1"),
          "nasal spine": ("nasal_spine", "anterior_nasal_spine", "ans"), "chin bone": ("pogonion_bone", "pog")}
-MIDLINE = ("glabella", "nasion", "pronasale", "columella", "subnasale", "upper lip", "lower lip",
-           "sublabiale", "pogonion", "menton")
+ABOVE_CHIN = ("glabella", "nasion", "pronasale", "columella", "subnasale", "upper lip", "lower lip")
+MIDLINE = (*ABOVE_CHIN, "sublabiale", "pogonion", "menton")
 
 
 def read_landmarks(file):

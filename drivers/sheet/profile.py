@@ -3,16 +3,19 @@ outline of the bones, the landmarks and a scale. It looks to the right."""
 
 import numpy as np
 
-from sheet.landmarks import MIDLINE
+from sheet.landmarks import ABOVE_CHIN, MIDLINE
 
 HEIGHT, MARGIN = 620, 16
 COLORS = ("before", "after", "other")
 
 
 def middle_plane(skin, known):
-    """Point and normal of the plane of symmetry: through the landmarks of the midline, upright; the
-    middle of the skin where there are none."""
-    points = np.array([known[name][0] for name in MIDLINE if name in known])
+    """Point and normal of the plane of symmetry: through the landmarks of the midline, upright, without
+    those of a chin, which may lie aside, where three others are known; the middle of the skin where there
+    are none."""
+    points = np.array([known[name][0] for name in ABOVE_CHIN if name in known])
+    if len(points) < 3:
+        points = np.array([known[name][0] for name in MIDLINE if name in known])
     if len(points) == 0:
         return (skin.before.min(0) + skin.before.max(0)) / 2, np.array([1.0, 0, 0])
     middle, normal = points.mean(0), np.array([1.0, 0, 0])

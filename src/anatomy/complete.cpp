@@ -7,6 +7,7 @@
 #include "lip_crease.h"
 #include "repose/anatomy/propose.h"
 #include "repose/base/error.h"
+#include "repose/scene/jaw_height.h"
 
 namespace repose::anatomy {
 namespace {
@@ -150,7 +151,6 @@ void remark_pitch(const scene::AnatomyPlan& plan, std::vector<std::string>& rema
 }
 
 void remark_teeth(const scene::AnatomyPlan& plan, std::vector<std::string>& remarks) {
-  constexpr double lower_height = 34, upper_height = 18;  // mm, with teeth at least
   const Vec3 *spine = find(plan.landmarks, "nasal_spine"),
              *upper = find(plan.landmarks, "upper_incisor_edge"),
              *lower = find(plan.landmarks, "lower_incisor_edge"),
@@ -163,8 +163,8 @@ void remark_teeth(const scene::AnatomyPlan& plan, std::vector<std::string>& rema
           jaw, height, minimum));
   };
   const Vec3 up = plan.axes.row(2);
-  if (spine && upper) remark("upper", up.dot(*spine - *upper), upper_height);
-  if (lower && menton) remark("lower", up.dot(*lower - *menton), lower_height);
+  if (spine && upper) remark("upper", up.dot(*spine - *upper), scene::upper_jaw_with_teeth);
+  if (lower && menton) remark("lower", up.dot(*lower - *menton), scene::lower_jaw_with_teeth);
 }
 
 }  // namespace

@@ -64,7 +64,8 @@ std::optional<double> FrontMap::foremost(double x, double z, double half_width) 
   return best;
 }
 
-std::vector<ProfilePoint> FrontMap::profile(double from_z, double to_z, double half_width) const {
+std::vector<ProfilePoint> FrontMap::profile(double from_z, double to_z, double half_width,
+                                            double aside) const {
   constexpr double rounding = 1e-6;  // of a cell, so that heights of the profile are ends of others
   const auto row = [&](double z) { return (z - low_z()) / spacing_ - 0.5; };
   const auto first = static_cast<int64_t>(std::ceil(std::max(row(from_z), 0.0) - rounding));
@@ -72,7 +73,7 @@ std::vector<ProfilePoint> FrontMap::profile(double from_z, double to_z, double h
   std::vector<ProfilePoint> points;
   for (int64_t i = first; static_cast<double>(i) <= last; ++i) {
     const double z = low_z() + (static_cast<double>(i) + 0.5) * spacing_;
-    if (const auto y = foremost(0, z, half_width)) points.emplace_back(*y, z);
+    if (const auto y = foremost(aside, z, half_width)) points.emplace_back(*y, z);
   }
   return points;
 }

@@ -7,7 +7,7 @@
 
 namespace repose::anatomy {
 
-/// A point of a profile in the midsagittal plane of a head frame, mm: y backwards, z up.
+/// A point of a profile in a sagittal plane of a head frame, mm: y backwards, z up.
 using ProfilePoint = Eigen::Vector2d;
 
 /// Depth of a surface as seen from in front: for each cell of a grid in the frontal plane of a head
@@ -26,9 +26,10 @@ class FrontMap {
   double high_z() const { return low_.y() + spacing_ * static_cast<double>(rows_); }
   double spacing() const { return spacing_; }  ///< mm, of the cells
 
-  /// The foremost points within `half_width` of the midline between two heights, from below, at
-  /// the middles of cells.
-  std::vector<ProfilePoint> profile(double from_z, double to_z, double half_width) const;
+  /// The foremost points within `half_width` of x = `aside`, the midline by default, between two
+  /// heights, from below, at the middles of cells.
+  std::vector<ProfilePoint> profile(double from_z, double to_z, double half_width,
+                                    double aside = 0) const;
 
  private:
   void draw(const std::array<Vec3, 3>& corner);

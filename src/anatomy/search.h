@@ -28,11 +28,11 @@ class Search {
   void put(const std::string& name, const Vec3& place) {
     if (!given_.contains(name)) found_[name] = place;
   }
-  /// Takes a point of the midline's profile.
+  /// Takes a point of the profile at x = `aside`, the midline by default.
   void put(const std::string& name, const std::optional<ProfilePoint>& point,
-           const std::string& otherwise) {
+           const std::string& otherwise, double aside = 0) {
     if (point)
-      put(name, Vec3(0, point->x(), point->y()));
+      put(name, Vec3(aside, point->x(), point->y()));
     else
       lack(name, otherwise);
   }

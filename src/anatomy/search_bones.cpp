@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "repose/scene/jaw_height.h"
 #include "repose/surface/edges.h"
 #include "scan_end.h"
 #include "search.h"
@@ -13,7 +14,6 @@ constexpr double incisors = 7;        // mm, half width of the front teeth
 constexpr double condyle_depth = 9;   // mm below its top
 constexpr double condyle_reach = 12;  // mm before and behind its top
 constexpr double rear = 0.27;         // share of the mandible's depth in which condyles lie
-constexpr double dentate = 34;        // mm, height of a symphysis with teeth at least
 constexpr double uneven = 0.8;        // of the rami's lengths, that a head may have
 constexpr double coronoid = 9;        // mm above the condyle's top, that a head may have
 
@@ -37,11 +37,11 @@ std::optional<Vec3> tooth_edge(const FrontMap& map, int sign, const ProfilePoint
   return edge;
 }
 
-/// Remarks on a chin beside the midsagittal plane: the median over its heights of the middle of
-/// what lies no farther back than `arch` behind its foremost place.
-void remark_aside(const FrontMap& map, double low, Search& search) {
+/// The x of a chin beside the midsagittal plane, mm: the median over its heights of the middle of
+/// what lies no farther back than `arch` behind its foremost place; 0 where that is near the plane.
+double middle_of_chin(const FrontMap& map, double low) {
   constexpr double above = 4, height = 12, half = 30, arch = 8;  // mm
-  constexpr double largest = 4;                                  // mm, that a head may have
+  constexpr double near = 4;                                     // mm, that a head may have
   std::vector<double> middles;
   for (double z = low + above; z <= low + above + height; z += map.spacing()) {
     const auto front = map.foremost(0, z, half);
@@ -54,48 +54,58 @@ void remark_aside(const FrontMap& map, double low, Search& search) {
     }
     if (left > right) middles.push_back((left + right) / 2);
   }
-  if (middles.empty()) return;
+  if (middles.empty()) return 0;
   const double aside = base::median(std::move(middles));
-  if (std::abs(aside) <= largest) return;
-  search.remark(fmt::format(
-      "the chin lies {:.0f} mm {} of the midsagittal plane by the condyles, in which its landmarks "
-      "are put: check them, and give the true ones (-landmarks)",
-      std::abs(aside), aside > 0 ? "left" : "right"));
+  return std::abs(aside) > near ? aside : 0;
+}
+
+/// Point B, on the profile at x = `aside`, after pogonion and the lower incisors.
+void search_b_point(const std::vector<ProfilePoint>& profile, double aside, Search& search) {
+  const auto menton = search.profile_point("menton_bone"),
+             pogonion = search.profile_point("pogonion_bone"),
+             edge = search.profile_point("lower_incisor_edge");
+  const double height = edge->y() - menton->y();
+  const double lowest = std::max(pogonion->y() + 0.1 * height, menton->y() + 0.35 * height);
+  search.put(
+      "b_point",
+      farthest_from_chord(between(profile, lowest, edge->y() - 0.2 * height), *pogonion, *edge, -1),
+      "no bone between pogonion and the lower incisors", aside);
 }
 
 void search_symphysis(const FrontMap& map, const ScanEnd& end, Search& search) {
   constexpr double cut = 3;  // mm
-  const auto profile = map.profile(map.low_z(), map.high_z(), midline);
+  auto profile = map.profile(map.low_z(), map.high_z(), midline);
   const auto lacks = [&](const char* why) {
     for (const char* name : {"menton_bone", "pogonion_bone", "b_point", "lower_incisor_edge"})
       search.lack(name, why);
   };
   if (profile.empty()) return lacks("MANDIBLE has no bone at the midline");
-  const double low = profile.front().y(), front = foremost_of(profile)->x();
-  const Vec3 lowest(0, profile.front().x(), low);
-  if (end.within(search.frame().to_scan(lowest), cut))
+  const double front = foremost_of(profile)->x(), aside = middle_of_chin(map, profile.front().y());
+  if (aside != 0) {
+    search.remark(
+        fmt::format("the chin lies {:.0f} mm {} of the skull's midsagittal plane; its landmarks of "
+                    "bone and skin "
+                    "are put there: check them",
+                    std::abs(aside), aside > 0 ? "left" : "right"));
+    profile = map.profile(map.low_z(), map.high_z(), midline, aside);
+  }
+  const ProfilePoint lowest = profile.front();
+  if (end.within(search.frame().to_scan({aside, lowest.x(), lowest.y()}), cut))
     return lacks("MANDIBLE is cut off flat at the chin, where the scan ends");
-  search.put("menton_bone", lowest);
-  const auto menton = *search.find("menton_bone");
-  remark_aside(map, menton.z(), search);
-  if (const auto edge = tooth_edge(map, 1, {front + 6, menton.z() + 5}, map.high_z(), 12))
+  search.put("menton_bone", lowest, "", aside);
+  const double menton = search.find("menton_bone")->z();
+  if (const auto edge = tooth_edge(map, 1, {front + 6, menton + 5}, map.high_z(), 12))
     search.put("lower_incisor_edge", *edge);
   const auto edge = search.profile_point("lower_incisor_edge");
   if (!edge) return search.lack("lower_incisor_edge", "no bone above the chin at the midline");
-  const double height = edge->y() - menton.z();
-  if (height < dentate)
+  const double height = edge->y() - menton;
+  if (height < scene::lower_jaw_with_teeth)
     search.remark(fmt::format(
         "MANDIBLE is {:.0f} mm high at the chin, {:.0f} mm or more with teeth: it may be "
         "edentulous, and lower_incisor_edge the crest of the bone",
-        height, dentate));
-  const auto chin = chin_of(profile, menton.z(), menton.z() + 0.45 * height);
-  search.put("pogonion_bone", chin, "no chin");
-  const auto pogonion = *search.profile_point("pogonion_bone");
-  const double lowest_b = std::max(pogonion.y() + 0.1 * height, menton.z() + 0.35 * height);
-  search.put("b_point",
-             farthest_from_chord(between(profile, lowest_b, edge->y() - 0.2 * height), pogonion,
-                                 *edge, -1),
-             "no bone between pogonion and the lower incisors");
+        height, scene::lower_jaw_with_teeth));
+  search.put("pogonion_bone", chin_of(profile, menton, menton + 0.45 * height), "no chin", aside);
+  search_b_point(profile, aside, search);
 }
 
 /// Returns whether the mandible ends at a condyle's top because its scan did.

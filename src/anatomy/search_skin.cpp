@@ -68,14 +68,21 @@ double search_mouth(const FrontMap& skin, Search& search) {
   return crease.gap / 2;
 }
 
-/// Takes a point of the skin's profile, unless the scan ended there.
+/// Takes a point of the skin's profile at x = `aside`, unless the scan ended there.
 void put_inside(const std::string& name, const std::optional<ProfilePoint>& point,
-                const ScanEnd& end, const std::string& otherwise, Search& search) {
+                const ScanEnd& end, const std::string& otherwise, Search& search,
+                double aside = 0) {
   constexpr double cut = 2;  // mm
-  if (point && end.within(search.frame().to_scan(Vec3(0, point->x(), point->y())), cut))
+  if (point && end.within(search.frame().to_scan(Vec3(aside, point->x(), point->y())), cut))
     return search.lack(name, "SKIN is cut off flat there, where the scan ends");
-  search.put(name, point, otherwise);
+  search.put(name, point, otherwise, aside);
 }
+
+/// The skin's profile in the sagittal plane of the bony chin.
+struct ChinProfile {
+  std::vector<ProfilePoint> profile;
+  double x;  // mm
+};
 
 void search_nose_tip(const std::vector<ProfilePoint>& profile, const ScanEnd& end, Search& search) {
   const auto nasion = search.find("nasion_bone"), spine = search.find("nasal_spine");
@@ -97,7 +104,8 @@ void search_nose_tip(const std::vector<ProfilePoint>& profile, const ScanEnd& en
              "SKIN ends below the glabella");
 }
 
-void search_lips(const std::vector<ProfilePoint>& profile, double gap, Search& search) {
+void search_lips(const std::vector<ProfilePoint>& profile, const ChinProfile& at_chin, double gap,
+                 Search& search) {
   const auto tip = search.profile_point("pronasale"), stomion = search.profile_point("stomion"),
              spine = search.profile_point("nasal_spine");
   const auto chin = search.profile_point("pogonion_soft");
@@ -119,11 +127,12 @@ void search_lips(const std::vector<ProfilePoint>& profile, double gap, Search& s
                "SKIN has no upper lip");
   if (!base) search.lack("subnasale", "SKIN has no base of the nose");
   if (!chin) return search.lack("lower_lip", "the chin was not found");
-  const auto lip = foremost_of(between(profile, low - 12, low));
+  const auto lip = foremost_of(between(at_chin.profile, low - 12, low));
   if (!lip) return search.lack("lower_lip", "SKIN has no lower lip");
-  search.put("b_soft",
-             farthest_from_chord(between(profile, chin->y() + 3, lip->y() - 3), *chin, *lip, -1),
-             "SKIN has no sulcus between lower lip and chin");
+  search.put(
+      "b_soft",
+      farthest_from_chord(between(at_chin.profile, chin->y() + 3, lip->y() - 3), *chin, *lip, -1),
+      "SKIN has no sulcus between lower lip and chin", at_chin.x);
   const auto sulcus = search.profile_point("b_soft");
   search.put(
       "lower_lip",
@@ -132,8 +141,8 @@ void search_lips(const std::vector<ProfilePoint>& profile, double gap, Search& s
       "SKIN has no lower lip");
 }
 
-void search_soft_chin(const std::vector<ProfilePoint>& profile, const surface::Surface& skin,
-                      const ScanEnd& end, Search& search) {
+void search_soft_chin(const ChinProfile& at_chin, const surface::Surface& skin, const ScanEnd& end,
+                      Search& search) {
   constexpr double around = 3, above = 9;  // mm
   const auto menton = search.find("menton_bone"), chin = search.find("pogonion_bone");
   if (!menton || !chin) {
@@ -141,8 +150,8 @@ void search_soft_chin(const std::vector<ProfilePoint>& profile, const surface::S
       search.lack(name, "the chin of MANDIBLE was not found");
     return;
   }
-  put_inside("pogonion_soft", chin_of(profile, chin->z() - above, chin->z() + above), end,
-             "SKIN has no chin", search);
+  put_inside("pogonion_soft", chin_of(at_chin.profile, chin->z() - above, chin->z() + above), end,
+             "SKIN has no chin", search, at_chin.x);
   std::optional<Vec3> below;
   for (const Vec3& point : skin.points) {
     const Vec3 p = search.frame().to_frame(point);
@@ -150,7 +159,7 @@ void search_soft_chin(const std::vector<ProfilePoint>& profile, const surface::S
     if (p.z() < menton->z() && (!below || p.z() > below->z())) below = p;
   }
   if (below)
-    search.put("menton_soft", Vec3(0, menton->y(), below->z()));
+    search.put("menton_soft", Vec3(menton->x(), menton->y(), below->z()));
   else
     search.lack("menton_soft", "SKIN has no point below menton");
 }
@@ -160,11 +169,13 @@ void search_soft_chin(const std::vector<ProfilePoint>& profile, const surface::S
 void search_skin(const surface::Surface& skin, Search& search) {
   const FrontMap map(skin, search.frame());
   const auto profile = map.profile(map.low_z(), map.high_z(), skin_midline);
+  const double chin = search.find("menton_bone").value_or(Vec3::Zero()).x();
+  const ChinProfile at_chin{map.profile(map.low_z(), map.high_z(), skin_midline, chin), chin};
   const double half_gap = search_mouth(map, search);
   const ScanEnd end(skin);
   search_nose_tip(profile, end, search);
-  search_soft_chin(profile, skin, end, search);
-  search_lips(profile, half_gap, search);
+  search_soft_chin(at_chin, skin, end, search);
+  search_lips(profile, at_chin, half_gap, search);
 }
 
 std::vector<Vec3> find_lip_crease(const surface::Surface& skin, const HeadFrame& frame,

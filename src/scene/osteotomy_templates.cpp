@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "head_axes.h"
+#include "repose/scene/jaw_height.h"
 
 namespace repose::scene {
 namespace {
@@ -119,7 +120,9 @@ std::vector<std::string> check_upper(const CutPlane& plane, const TemplatePlacem
   constexpr double floor = 3, roots = 27;  // mm above the spine, above the edge
   std::vector<std::string> lines;
   const double above = height_above(plane, head.at("nasal_spine"), head.axes().up);
-  const double edge = height_above(plane, head.at("upper_incisor_edge"), head.axes().up);
+  const Vec3 incisors = head.at("upper_incisor_edge");
+  const double edge = height_above(plane, incisors, head.axes().up),
+               jaw = (head.at("nasal_spine") - incisors).dot(head.axes().up);
   if (above < 0)
     lines.push_back(
         fmt::format("its plane passes {:.1f} mm below the nasal spine, through the hard palate; "
@@ -130,7 +133,7 @@ std::vector<std::string> check_upper(const CutPlane& plane, const TemplatePlacem
         "its plane passes {:.1f} mm above the nasal spine; with less than {:g} mm it may open the "
         "hard palate",
         above, floor));
-  if (edge < roots)
+  if (edge < roots && jaw >= upper_jaw_with_teeth)
     lines.push_back(fmt::format(
         "its plane passes {:.1f} mm above the edge of the upper incisors; by rule roots "
         "end {:g} mm above it",
@@ -144,8 +147,8 @@ std::vector<std::string> check_lower(const CutPlane& plane, const TemplatePlacem
   std::vector<std::string> lines;
   const auto [left, back, up] = mandible_axes(head);
   const Vec3 edge = head.at("lower_incisor_edge"), menton = head.at("menton_bone");
-  const double below = -height_above(plane, edge, up);
-  if (below < roots)
+  const double below = -height_above(plane, edge, up), jaw = (edge - menton).dot(up);
+  if (below < roots && jaw >= lower_jaw_with_teeth)
     lines.push_back(fmt::format(
         "its plane passes {:.1f} mm below the edge of the lower incisors; by rule roots "
         "end {:g} mm below it",

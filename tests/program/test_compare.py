@@ -145,7 +145,8 @@ def test_regions_painted_on_a_mesh(run, tmp_path):
     # What is far from all that is painted belongs to no region.
     moved = meshio.Mesh(mesh.points + [500, 0, 0], mesh.cells)
     paint(tmp_path / "far.ply", moved, "int", ["label"], [[1]] * len(mesh.points))
-    assert rows(run("repose-compare", "a.ply", "b.ply", "-regions", "far.ply").stdout)["label 1"][0] == 0
+    result = run("repose-compare", "a.ply", "b.ply", "-regions", "far.ply")
+    assert re.search(r"^ *label 1 +0 +-$", result.stdout, re.M), "no numbers without samples"
 
 
 def test_numbers_around_landmarks(run, tmp_path):
@@ -160,7 +161,7 @@ def test_numbers_around_landmarks(run, tmp_path):
     found = rows(result.stdout)
     assert found["top"][1:] == pytest.approx([3] * 6, abs=0.2)
     assert found["side"][1:] == pytest.approx([0] * 6, abs=0.05)
-    assert found["side"][0] > 100 and found["far"] == [0] * 7
+    assert found["side"][0] > 100 and re.search(r"^ *far +0 +-$", result.stdout, re.M)
 
 
 SKIN, MARKS = PROJECT / "meshes/head_skin.ply", PROJECT / "meshes/head.mrk.json"

@@ -66,16 +66,33 @@ def test_noise_moves_a_flat_nasion_little(run, tmp_path):
     assert np.linalg.norm(np.subtract(found[1:], found[0]), axis=1).max() < 1.5
 
 
-@pytest.mark.parametrize("aside, remarked", [(0, False), (2, False), (-6, True), (8, True)])
-def test_a_chin_beside_the_midline_is_reported(run, tmp_path, aside, remarked):
-    surfaces = turned(tmp_path, f"{MESHES}/head_", np.eye(3))
-    jaw = meshio.read(tmp_path / "mandible.ply")
-    behind = jaw.points[:, 1].max() - jaw.points[:, 1]
-    jaw.points[:, 0] += aside * behind / behind.max()
-    jaw.write(tmp_path / "mandible.ply")
-    result = run("repose-landmarks", *surfaces)
-    line = rf"the chin lies [5-8] mm {'left' if aside > 0 else 'right'} of the midsagittal plane"
-    assert result.returncode == 0 and bool(re.search(line, result.stdout)) == remarked, result.stdout
+OF_THE_CHIN = ("menton_bone", "pogonion_bone", "b_point", "menton_soft", "pogonion_soft", "b_soft")
+
+
+@pytest.mark.parametrize("aside", [0, 2, -6, 8])
+def test_a_chin_beside_the_midline_keeps_its_landmarks(run, tmp_path, aside):
+    """The chin is moved sideways, bone and skin, by less and less towards mouth and condyles."""
+    assert run("repose-landmarks", *SURFACES, "-output", "symmetric").returncode == 0
+    symmetric = points(tmp_path / "symmetric.mrk.json")
+    condyles = np.mean([symmetric[f"condyle_{side}_center"] for side in ("left", "right")], axis=0)
+    chin, lip = symmetric["menton_bone"], symmetric["lower_lip"]
+
+    def sideways(places):
+        behind = (condyles[1] - places[:, 1]) / (condyles[1] - chin[1])
+        below = (lip[2] - places[:, 2]) / 10
+        return np.outer(aside * np.clip(behind, 0, 1) * np.clip(below, 0, 1), [1, 0, 0])
+
+    result = run("repose-landmarks", *turned(tmp_path, f"{MESHES}/head_", np.eye(3), sideways))
+    line = rf"the chin lies [5-8] mm {'left' if aside > 0 else 'right'} of the skull's midsagittal plane; "
+    assert result.returncode == 0 and bool(re.search(line, result.stdout)) == (abs(aside) > 4), result.stdout
+    found = points(tmp_path / "landmarks.mrk.json")
+    for name, place in symmetric.items():
+        x, *others = np.subtract(found[name], place)
+        with_chin = name in OF_THE_CHIN and abs(aside) > 4
+        in_midline = abs(place[0]) < 5 and not with_chin
+        expected = 0 if in_midline else sideways(np.array([place]))[0, 0]
+        assert x == pytest.approx(expected, abs=1.5 if with_chin else 0.5), name
+        assert np.linalg.norm(others) < 1.5, name
 
 
 @pytest.mark.parametrize("change, line", [

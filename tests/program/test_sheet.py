@@ -22,6 +22,7 @@ from sheet.landmarks import on_surface, place_landmarks, read_landmarks  # noqa:
 from sheet.measures import MEASURES, read_norms  # noqa: E402
 from sheet.meshes import coarser  # noqa: E402
 from sheet.page import plan_table  # noqa: E402
+from sheet.profile import middle_plane  # noqa: E402
 from sheet.script import Unusable, own_names  # noqa: E402
 from sheet.shown_skin import Skin, matching_rows, rows_of_patient  # noqa: E402
 from sheet.whole_file import Target  # noqa: E402
@@ -106,6 +107,13 @@ def test_a_landmark_goes_to_the_nearest_place_of_all_triangles():
         sampled = np.linalg.norm(samples - point, axis=1).min()
         assert sampled - 0.02 < distance < sampled + 1e-9
         assert distance == pytest.approx(np.linalg.norm(near - point))
+
+
+def test_a_chin_aside_does_not_tilt_the_plane_of_symmetry():
+    straight = {"nasion": (0.0, -90, 60), "pronasale": (0, -110, 20), "upper lip": (0, -95, -5)}
+    aside = straight | {"pogonion": (8.0, -90, -40), "menton": (8, -80, -50)}
+    middle, normal = middle_plane(None, {name: [np.array(place)] for name, place in aside.items()})
+    assert middle[0] == 0 and normal == pytest.approx([1, 0, 0])
 
 
 def test_a_landmark_amid_a_large_triangle_of_bone_goes_with_the_bone():

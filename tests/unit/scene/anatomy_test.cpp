@@ -286,6 +286,23 @@ TEST(OsteotomyWarnings, NamePalateRootsAndCanal) {
   EXPECT_NE(roots[1].find("mental foramen"), std::string::npos);
 }
 
+TEST(OsteotomyWarnings, NameNoRootsOfEdentulousJaws) {
+  Landmarks edentulous = head();
+  edentulous["lower_incisor_edge"] = edentulous["menton_bone"] + Vec3(0, 0, 26);
+  edentulous["upper_incisor_edge"] = edentulous["nasal_spine"] - Vec3(0, 0, 14);
+  const auto lines = [&](const char* bone, const Vec3& point) {
+    return read(edentulous,
+                fmt::format("osteotomies: [{{bone: {}, piece: a, planes: [{{point: [{}, {}, {}], "
+                            "normal: [0, 0, -1]}}]}}]\n",
+                            bone, point.x(), point.y(), point.z()))
+        .warnings;
+  };
+  EXPECT_TRUE(lines("skull", edentulous["nasal_spine"] + Vec3(0, 0, 5)).empty());
+  for (const std::string& line :
+       lines("mandible", edentulous["lower_incisor_edge"] - Vec3(0, 0, 14)))
+    EXPECT_EQ(line.find("roots"), std::string::npos) << line;
+}
+
 Vec3 moved(const std::string& cut, const std::string& bone, const std::string& clinical,
            const Vec3& point, size_t row = 2) {
   return read(head(),
