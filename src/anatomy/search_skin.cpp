@@ -68,23 +68,23 @@ double search_mouth(const FrontMap& skin, Search& search) {
   return crease.gap / 2;
 }
 
-/// Takes a point of the skin's profile at x = `aside`, unless the scan ended there.
-void put_inside(const std::string& name, const std::optional<ProfilePoint>& point,
-                const ScanEnd& end, const std::string& otherwise, Search& search,
-                double aside = 0) {
-  constexpr double cut = 2;  // mm
-  if (point && end.within(search.frame().to_scan(Vec3(aside, point->x(), point->y())), cut))
-    return search.lack(name, "SKIN is cut off flat there, where the scan ends");
-  search.put(name, point, otherwise, aside);
-}
-
-/// The skin's profile in the sagittal plane of the bony chin.
-struct ChinProfile {
-  std::vector<ProfilePoint> profile;
+/// The skin's profile in a sagittal plane, and where its scan ended.
+struct SkinProfile {
   double x;  // mm
+  std::vector<ProfilePoint> points;
+  const ScanEnd& end;
 };
 
-void search_nose_tip(const std::vector<ProfilePoint>& profile, const ScanEnd& end, Search& search) {
+/// Takes a point of a profile, unless the scan ended there.
+void put_inside(const std::string& name, const std::optional<ProfilePoint>& point,
+                const SkinProfile& profile, const std::string& otherwise, Search& search) {
+  constexpr double cut = 2;  // mm
+  if (point && profile.end.within(search.frame().to_scan({profile.x, point->x(), point->y()}), cut))
+    return search.lack(name, "SKIN is cut off flat there, where the scan ends");
+  search.put(name, point, otherwise, profile.x);
+}
+
+void search_nose_tip(const SkinProfile& profile, Search& search) {
   const auto nasion = search.find("nasion_bone"), spine = search.find("nasal_spine");
   if (!spine) {
     for (const char* name : {"pronasale", "subnasale", "nasion_soft"})
@@ -92,19 +92,19 @@ void search_nose_tip(const std::vector<ProfilePoint>& profile, const ScanEnd& en
     return;
   }
   const double top = nasion ? nasion->z() : spine->z() + 45;
-  put_inside("pronasale", foremost_of(between(profile, spine->z() - 10, top)), end,
+  put_inside("pronasale", foremost_of(between(profile.points, spine->z() - 10, top)), profile,
              "SKIN has no nose", search);
   const auto tip = search.profile_point("pronasale");
-  const auto brow = foremost_of(between(profile, top + 8, top + 30));
+  const auto brow = foremost_of(between(profile.points, top + 8, top + 30));
   if (!tip || !brow)
     return search.lack("nasion_soft",
                        tip ? "SKIN ends below the glabella" : "the tip of the nose was not found");
   search.put("nasion_soft",
-             farthest_from_chord(between(profile, top - 12, top + 12), *tip, *brow, -1),
+             farthest_from_chord(between(profile.points, top - 12, top + 12), *tip, *brow, -1),
              "SKIN ends below the glabella");
 }
 
-void search_lips(const std::vector<ProfilePoint>& profile, const ChinProfile& at_chin, double gap,
+void search_lips(const SkinProfile& profile, const SkinProfile& at_chin, double gap,
                  Search& search) {
   const auto tip = search.profile_point("pronasale"), stomion = search.profile_point("stomion"),
              spine = search.profile_point("nasal_spine");
@@ -115,43 +115,48 @@ void search_lips(const std::vector<ProfilePoint>& profile, const ChinProfile& at
     return;
   }
   const double s = stomion->y(), low = gap > 0 ? s - gap : s - 2;  // where the lower lip begins
-  const auto first = foremost_of(between(profile, s + 2, s + 0.6 * (tip->y() - s)));
+  const auto first = foremost_of(between(profile.points, s + 2, s + 0.6 * (tip->y() - s)));
   if (first)
-    search.put(
-        "subnasale",
-        farthest_from_chord(between(profile, first->y() + 2, tip->y() - 3), *first, *tip, -1), "");
+    search.put("subnasale",
+               farthest_from_chord(between(profile.points, first->y() + 2, tip->y() - 3), *first,
+                                   *tip, -1),
+               "");
   const auto base = search.profile_point("subnasale");
   if (base)
-    search.put("upper_lip",
-               farthest_from_chord(between(profile, s + 2, base->y() - 3), *stomion, *base, 1),
-               "SKIN has no upper lip");
+    search.put(
+        "upper_lip",
+        farthest_from_chord(between(profile.points, s + 2, base->y() - 3), *stomion, *base, 1),
+        "SKIN has no upper lip");
   if (!base) search.lack("subnasale", "SKIN has no base of the nose");
   if (!chin) return search.lack("lower_lip", "the chin was not found");
-  const auto lip = foremost_of(between(at_chin.profile, low - 12, low));
+  const auto lip = foremost_of(between(at_chin.points, low - 12, low));
   if (!lip) return search.lack("lower_lip", "SKIN has no lower lip");
   search.put(
       "b_soft",
-      farthest_from_chord(between(at_chin.profile, chin->y() + 3, lip->y() - 3), *chin, *lip, -1),
+      farthest_from_chord(between(at_chin.points, chin->y() + 3, lip->y() - 3), *chin, *lip, -1),
       "SKIN has no sulcus between lower lip and chin", at_chin.x);
   const auto sulcus = search.profile_point("b_soft");
-  search.put(
-      "lower_lip",
-      farthest_from_chord(between(profile, std::max(low - 14, sulcus ? sulcus->y() + 2 : 0), low),
-                          sulcus.value_or(*chin), *stomion, 1),
-      "SKIN has no lower lip");
+  search.put("lower_lip",
+             farthest_from_chord(
+                 between(profile.points, std::max(low - 14, sulcus ? sulcus->y() + 2 : 0), low),
+                 sulcus.value_or(*chin), *stomion, 1),
+             "SKIN has no lower lip");
 }
 
-void search_soft_chin(const ChinProfile& at_chin, const surface::Surface& skin, const ScanEnd& end,
-                      Search& search) {
-  constexpr double around = 3, above = 9;  // mm
+void search_soft_chin(const SkinProfile& at_chin, const surface::Surface& skin, Search& search) {
+  constexpr double around = 3, most_above = 9;  // mm
+  constexpr double share = 0.08;                // of the height of the face
   const auto menton = search.find("menton_bone"), chin = search.find("pogonion_bone");
   if (!menton || !chin) {
     for (const char* name : {"pogonion_soft", "menton_soft"})
       search.lack(name, "the chin of MANDIBLE was not found");
     return;
   }
-  put_inside("pogonion_soft", chin_of(at_chin.profile, chin->z() - above, chin->z() + above), end,
-             "SKIN has no chin", search, at_chin.x);
+  const auto nasion = search.find("nasion_bone");
+  const double above =
+      nasion ? std::min(most_above, share * (nasion->z() - menton->z())) : most_above;
+  put_inside("pogonion_soft", chin_of(at_chin.points, chin->z() - above, chin->z() + above),
+             at_chin, "SKIN has no chin", search);
   std::optional<Vec3> below;
   for (const Vec3& point : skin.points) {
     const Vec3 p = search.frame().to_frame(point);
@@ -168,14 +173,16 @@ void search_soft_chin(const ChinProfile& at_chin, const surface::Surface& skin, 
 
 void search_skin(const surface::Surface& skin, Search& search) {
   const FrontMap map(skin, search.frame());
-  const auto profile = map.profile(map.low_z(), map.high_z(), skin_midline);
-  const double chin = search.find("menton_bone").value_or(Vec3::Zero()).x();
-  const ChinProfile at_chin{map.profile(map.low_z(), map.high_z(), skin_midline, chin), chin};
-  const double half_gap = search_mouth(map, search);
   const ScanEnd end(skin);
-  search_nose_tip(profile, end, search);
-  search_soft_chin(at_chin, skin, end, search);
-  search_lips(profile, at_chin, half_gap, search);
+  const auto profile_at = [&](double x) {
+    return SkinProfile{x, map.profile(map.low_z(), map.high_z(), skin_midline, x), end};
+  };
+  const SkinProfile midline = profile_at(0),
+                    at_chin = profile_at(search.find("menton_bone").value_or(Vec3::Zero()).x());
+  const double half_gap = search_mouth(map, search);
+  search_nose_tip(midline, search);
+  search_soft_chin(at_chin, skin, search);
+  search_lips(midline, at_chin, half_gap, search);
 }
 
 std::vector<Vec3> find_lip_crease(const surface::Surface& skin, const HeadFrame& frame,

@@ -66,6 +66,14 @@ def test_noise_moves_a_flat_nasion_little(run, tmp_path):
     assert np.linalg.norm(np.subtract(found[1:], found[0]), axis=1).max() < 1.5
 
 
+@pytest.mark.skipif(not DATA.is_dir(), reason=f"no real head: {DATA} is missing")
+def test_a_small_head_has_the_same_landmarks(run, tmp_path):
+    for name, scale in (("head", 1), ("small", 0.75)):
+        assert run("repose-landmarks", *turned(tmp_path, f"{DATA}/", scale * np.eye(3)), "-output", name).returncode == 0
+    large, small = (points(tmp_path / f"{name}.mrk.json") for name in ("head", "small"))
+    assert max(np.linalg.norm(np.subtract(small[name], 0.75 * np.array(place))) for name, place in large.items()) < 2
+
+
 OF_THE_CHIN = ("menton_bone", "pogonion_bone", "b_point", "menton_soft", "pogonion_soft", "b_soft")
 
 
