@@ -247,7 +247,7 @@ void ResultFile::commit() {
   const base::Logged logged(write_event());
   State& s = *state_;
   const std::scoped_lock lock(s.mutex);
-  if (s.provisional || s.marked) {
+  if (s.provisional) {
     s.part.open();
     s.settle_last();
     s.part.close();

@@ -85,9 +85,14 @@ double LoadPath::requested_step() const {
   return settings_.load_steps > 0 ? 1.0 / settings_.load_steps : automatic_step();
 }
 
+/// Returns true if load 1 has to be reached again from load 0: with contact, where other steps than
+/// the automatic ones are requested or led to the state of a restarted run.
 bool LoadPath::ends_in_automatic_steps() const {
-  return objective_.positions().part().contact && !settings_.ends_along && result_.load == 0 &&
-         requested_step() != automatic_step();
+  constexpr double nearly = 1e-9;
+  if (!objective_.positions().part().contact || settings_.ends_along) return false;
+  if (result_.load == 0) return requested_step() != automatic_step();
+  const double steps = result_.load / automatic_step();
+  return std::abs(steps - std::round(steps)) > nearly;
 }
 
 int64_t LoadPath::inverted(Vec displacement) {
@@ -251,7 +256,6 @@ PathOutcome LoadPath::run(Vec displacement, Vec guess, const OnStep& on_step) {
     if (result_.leapt) return result_;
   }
   const base::VecHandle start = positions.make_vector();
-  check(VecCopy(displacement, start));
   const ContactPressures at_start = search_.pressures();
   settle(displacement, on_step);
   if (guess && !settings_.near_guess && result_.last.converged && !result_.last.stopped &&
@@ -329,6 +333,7 @@ void LoadPath::follow_again(Vec start, const ContactPressures& at_start, Vec dis
   result_.last.stopped = stopped;
   positions.set_load(result_.load);
   positions.update(displacement);
+  objective_.contact().place_bodies();
   search_.set_pressures(reached_pressures);
   follow(displacement, requested_step(), 1, on_step);
 }

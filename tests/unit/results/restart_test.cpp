@@ -35,6 +35,18 @@ TEST(Restart, IsFromTheLastRestPosition) {
   EXPECT_EQ(restart.position, small_rows(small_model(), 0.5).position);
 }
 
+TEST(Restart, IsFromTheLastStepOfARunThatWasStoppedOnItsWay) {
+  const Folder folder;
+  const model::Model m = small_model();
+  ResultFile file(MPI_COMM_SELF, folder.path("a"), m, model::all_rows(m));
+  for (const double load : {0.0, 0.5}) file.append(small_numbers(load), small_rows(m, load));
+  file.commit();
+  const model::StepNumbers last = read_step(folder.path("a.h5"), 1, m).numbers;
+  EXPECT_FALSE(last.converged);
+  EXPECT_EQ(last.reason, stopped_at_rest);
+  EXPECT_EQ(read_restart(MPI_COMM_SELF, folder.path("a.h5"), m).load, 0.5);
+}
+
 TEST(Restart, IsByAGuessWhereOnlyASearchAtTheEndWasUnderWay) {
   for (const std::vector<StepState>& steps :
        {std::vector<StepState>{{0, true}, {1, false}}, {{1, false}}}) {

@@ -99,6 +99,28 @@ TEST(Contact, APlateThatPressesAConfinedBlockMeetsTheSamePressureEverywhere) {
   EXPECT_LE(rest.summary.last.penetration, 1e-6);
 }
 
+TEST(Contact, ARunStoppedInItsLastPassReportsTheStateItReached) {
+  model::Model m = solid_block(5, 4, 4, poisson, 0, [](int, int, int a) {
+    return a == 3 ? PointSet::boundary : PointSet::soft_tissue;
+  });
+  const Vec3 z = Vec3::UnitZ();
+  bind_face(m, plane(Vec3::Zero(), -z, {0, 0, -1.8}), Binding::touches, face_areas(m, z, 0));
+  solve::Settings stopped = settings(1e-6);
+  stopped.path.load_steps = 3;
+  double now = 0;
+  stopped.on_iterate = [&](double load, const solve::StateSnapshot&) { now = load; };
+  stopped.abandoned = [&] { return now == 1; };
+  const Rest rest = testing::find_rest(m, stopped);
+  EXPECT_NEAR(rest.summary.path.load, 2.0 / 3, 1e-12);
+  EXPECT_TRUE(rest.summary.path.last.stopped);
+  EXPECT_FALSE(rest.summary.path.complete());
+  const std::vector<double>& force = field(rest, "contact_force");
+  double whole = 0;
+  for (size_t i = 0; i < m.points.position.size(); ++i) whole -= force[3 * i + 2];
+  EXPECT_GT(whole, 0.1);
+  EXPECT_NEAR(rest.summary.contacts[0].force.z(), whole, 1e-3 * whole);
+}
+
 // A penalty 80 times softer than the tissue leaves 80/81 of the gap after each round.
 TEST(Contact, APenaltyThatIsFarTooSoftIsStiffened) {
   model::Model m = solid_block(4, 4, 4, 0, 0, [](int, int, int a) {

@@ -104,6 +104,17 @@ TEST(LoadPath, EndsWithContactInAutomaticStepsFromTheStart) {
   EXPECT_LT(depth(path), 2.5) << "one automatic step";
 }
 
+TEST(LoadPath, ARestartOnTheWayEndsWithContactInAutomaticStepsFromTheStart) {
+  Path path;
+  path.settings.load_steps = 0;
+  path.settings.start_load = 0.75;
+  path.displacement = path.lowered(-3);
+  const solve::PathOutcome result = run_with_contact(path);
+  EXPECT_TRUE(result.complete());
+  EXPECT_EQ(path.loads, (std::vector<double>{0.75, 1}));
+  EXPECT_LT(depth(path), 2.5) << "one automatic step";
+}
+
 TEST(LoadPath, EndsWithContactAlongItsStepsWhereThatIsRequested) {
   Path path;
   path.settings.ends_along = true;
