@@ -18,8 +18,9 @@ FrontMap::FrontMap(const surface::Surface& surface, const HeadFrame& frame) {
   points.reserve(surface.points.size());
   for (const Vec3& p : surface.points) points.push_back(frame.to_frame(p));
   const Eigen::AlignedBox3d box = surface::bounding_box(points);
-  low_ = {box.min().x() - spacing_, box.min().z() - spacing_};
-  columns_ = static_cast<int64_t>(box.sizes().x() / spacing_) + 3;
+  // Columns lie in the midline and as far beside it on both sides, so that mirrored heads agree.
+  low_ = {spacing_ * (std::floor(box.min().x() / spacing_) - 0.5), box.min().z() - spacing_};
+  columns_ = static_cast<int64_t>((box.max().x() - low_.x()) / spacing_) + 2;
   rows_ = static_cast<int64_t>(box.sizes().z() / spacing_) + 3;
   depth_.assign(columns_ * rows_, nothing);
   for (const Triangle& t : surface.triangles) draw(base::pick(points, t));

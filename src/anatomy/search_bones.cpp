@@ -18,23 +18,33 @@ constexpr double uneven = 0.8;        // of the rami's lengths, that a head may 
 constexpr double coronoid = 9;        // mm above the condyle's top, that a head may have
 
 /// The extreme edge of bone at the front teeth: the highest (sign 1) or lowest (−1) cell from the
-/// height of `start` to `to_z`, within the incisors' width and `reach` of the depth of `start`.
+/// height of `start` to `to_z`, within the incisors' width and `reach` of the depth of `start`. Its
+/// depth is the mean over edges that end nearly there, so that no single tooth decides.
 std::optional<Vec3> tooth_edge(const FrontMap& map, int sign, const ProfilePoint& start,
                                double to_z, double reach) {
-  std::optional<Vec3> edge;
+  constexpr double level = 1;  // mm
+  std::vector<ProfilePoint> edges;
   for (double x = -incisors; x <= incisors; x += map.spacing()) {
-    std::optional<Vec3> end;
+    std::optional<ProfilePoint> end;
     for (double z = start.y(); sign * (to_z - z) >= 0; z += sign * map.spacing()) {
       const auto depth = map.depth(x, z);
       if (depth && std::abs(*depth - start.x()) <= reach)
-        end = Vec3(x, *depth, z);
+        end = ProfilePoint(*depth, z);
       else if (end)
         break;
     }
-    if (end && (!edge || sign * (end->z() - edge->z()) > 0)) edge = end;
+    if (end) edges.push_back(*end);
   }
-  if (edge) edge->x() = 0;  // of whichever tooth, in the midsagittal plane
-  return edge;
+  if (edges.empty()) return std::nullopt;
+  double extreme = edges.front().y();
+  for (const ProfilePoint& edge : edges) extreme = sign * std::max(sign * extreme, sign * edge.y());
+  double weights = 0, moment = 0;
+  for (const ProfilePoint& edge : edges) {
+    const double weight = std::max(level - sign * (extreme - edge.y()), 0.0);
+    weights += weight;
+    moment += weight * edge.x();
+  }
+  return Vec3(0, moment / weights, extreme);
 }
 
 /// The x of a chin beside the midsagittal plane, mm: the median over its heights of the middle of

@@ -66,6 +66,19 @@ def test_noise_moves_a_flat_nasion_little(run, tmp_path):
     assert np.linalg.norm(np.subtract(found[1:], found[0]), axis=1).max() < 1.5
 
 
+@pytest.mark.parametrize("head", [f"{MESHES}/head_", pytest.param(
+    f"{DATA}/", marks=pytest.mark.skipif(not DATA.is_dir(), reason=f"no real head: {DATA} is missing"))])
+def test_a_mirrored_head_has_mirrored_landmarks(run, tmp_path, head):
+    mirror = np.array([-1, 1, 1])
+    for name, change in (("given", np.eye(3)), ("mirrored", np.diag(mirror))):
+        assert run("repose-landmarks", *turned(tmp_path, head, change), "-output", name).returncode == 0
+    given, mirrored = (points(tmp_path / f"{name}.mrk.json") for name in ("given", "mirrored"))
+    other = {"left": "right", "right": "left"}
+    for name, place in given.items():
+        twin = mirrored["_".join(other.get(word, word) for word in name.split("_"))]
+        assert np.linalg.norm(mirror * twin - place) < 0.3, name
+
+
 @pytest.mark.skipif(not DATA.is_dir(), reason=f"no real head: {DATA} is missing")
 def test_a_small_head_has_the_same_landmarks(run, tmp_path):
     for name, scale in (("head", 1), ("small", 0.75)):

@@ -5,6 +5,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "../../folder.h"
 #include "repose/anatomy/propose.h"
@@ -22,9 +23,11 @@ struct Completed {
   std::vector<std::string> remarks;
 };
 
-/// A head completed by those landmarks that are proposed for it, but for `without`.
+/// A head completed by those landmarks that are proposed for it, but for `without`, with its own
+/// overjet or another one.
 Completed complete_head(const std::string& skin_file, const std::string& skull_file,
-                        const std::string& mandible_file, const std::vector<std::string>& without) {
+                        const std::string& mandible_file, const std::vector<std::string>& without,
+                        std::optional<double> overjet = {}) {
   const surface::Surface skin = surface::read_surface(skin_file),
                          skull = surface::read_surface(skull_file),
                          mandible = surface::read_surface(mandible_file);
@@ -33,6 +36,8 @@ Completed complete_head(const std::string& skin_file, const std::string& skull_f
   plan.file = "head.mrk.json";
   plan.landmarks = propose_landmarks(skin, skull, mandible, {}).found;
   for (const std::string& name : without) plan.landmarks.erase(name);
+  if (overjet)
+    plan.landmarks["lower_incisor_edge"].y() = plan.landmarks["upper_incisor_edge"].y() + *overjet;
   done.scene.anatomy = plan;
   done.scene.tissue.material = scene::Material{};
   done.scene.tissue.attach_regions.push_back(
@@ -41,9 +46,11 @@ Completed complete_head(const std::string& skin_file, const std::string& skull_f
   return done;
 }
 
-Completed complete_shipped(const std::vector<std::string>& without = {}) {
+Completed complete_shipped(const std::vector<std::string>& without = {},
+                           std::optional<double> overjet = {}) {
   const std::string head = REPOSE_MESHES "/head_";
-  return complete_head(head + "skin.ply", head + "skull.ply", head + "mandible.ply", without);
+  return complete_head(head + "skin.ply", head + "skull.ply", head + "mandible.ply", without,
+                       overjet);
 }
 
 bool says(const Completed& done, const std::string& part) {
@@ -84,7 +91,7 @@ TEST(CompleteScene, AnOpenMouthIsNotParted) {
 }
 
 TEST(CompleteScene, TheVestibuleComesBeforeRegionsOfTheScene) {
-  const Completed done = complete_shipped();
+  const Completed done = complete_shipped({}, 5);
   ASSERT_EQ(done.scene.tissue.attach_regions.size(), 3u);
   EXPECT_EQ(done.scene.tissue.attach_regions[0].attach, scene::Attach::contact);
   EXPECT_EQ(done.scene.tissue.attach_regions[1].attach, scene::Attach::contact);
@@ -92,7 +99,7 @@ TEST(CompleteScene, TheVestibuleComesBeforeRegionsOfTheScene) {
 }
 
 TEST(CompleteScene, LowerTeethHaveAGapOfTheirOwnBelowStomion) {
-  const Completed done = complete_shipped();
+  const Completed done = complete_shipped({}, 5);
   const scene::AttachRegion &whole = done.scene.tissue.attach_regions.at(0),
                             &lower = done.scene.tissue.attach_regions.at(1);
   const auto &outer = std::get<scene::TurnedBox>(whole.where).box,
