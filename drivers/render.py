@@ -159,14 +159,14 @@ class Result:
             self.h5 = h5py.File(file)
             if "step" not in self.h5 or not len(self.h5["step"]) or "model/skin/points" not in self.h5:
                 raise Unusable(f"{file}: holds no solved skin; solve it with repose-solve first")
-            self.take(file.removesuffix(".h5"), solved_skin)
+            self.take(solved_skin)
 
-    def take(self, name, solved_skin):
+    def take(self, solved_skin):
         self.model = self.h5["model"]
         self.steps = [self.h5["step"][name] for name in sorted(self.h5["step"])]
         self.loads = [step.attrs["load"] for step in self.steps]
         solved, self.used = shown_skin.solved_skin(self.h5)
-        shown = solved if solved_skin else shown_skin.shown_skin(self.h5, name)
+        shown = solved if solved_skin else shown_skin.shown_skin(self.h5)
         self.corners, self.before, self.solved = shown.corners, shown.before, shown.solved
         self.given = None if len(shown.before) == len(solved.before) else shown
         self.near = None if self.given is None else shown_skin.matching_rows(solved, shown)

@@ -11,8 +11,8 @@ from sheet.shown_skin import matching_rows, opened, read_given, read_places, rea
 
 # Rows of the summary of repose-solve that the page repeats, and words that only those have that warn
 CAUTIONS = {"warning": "", "other rest position": "", "pierced by bone": "", "pierced by instrument": "",
-            "skin on bone": "", "exact penetration": "points are deeper", "bone through skin": "", "self-contact": "",
-            "path": "DEPENDS"}
+            "skin on bone": "", "exact penetration": "points are deeper", "bone through skin": "",
+            "border of the skin": "", "self-contact": "", "path": "DEPENDS"}
 PLACE = re.compile(r"(?:at|about) \((\S+), (\S+), (\S+)\)(?: mm)?")
 
 
@@ -46,7 +46,7 @@ class Result:
             self.end = self.steps[-1]
             last = h5["step"][sorted(h5["step"])[-1]]
             self.solved, used = solved_skin(h5)
-            self.given = read_given(file.removesuffix(".h5") + "_given_skin.vtp")
+            self.given = read_given(h5)
             self.skin = opened(self.given, self.solved) if self.given else self.solved
             self.read_tissue(h5["model"], last)
             self.read_bones(h5["model"], last)

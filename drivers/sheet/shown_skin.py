@@ -1,14 +1,10 @@
 """The skin that is shown of a result: the one that was given, displaced, where another was solved in
 its place, with lips and cuts open; otherwise the one that was solved. Arrays in mm."""
 
-import base64
-import pathlib
-import xml.etree.ElementTree
-
 import numpy as np
 
 from sheet.meshes import edges
-from sheet.script import Unusable, reading
+from sheet.script import Unusable
 
 AROUND_CUTS = 4.0  # mm: so near to a cut the solved skin is shown, which is cut open
 SMOOTHINGS = 8     # as many neighbors from a side of a cut, whose border may be jagged
@@ -45,19 +41,14 @@ class Skin:
         self.before, self.after = self.before @ axes.T, self.after @ axes.T
 
 
-def read_given(file):
-    """The given skin of a NAME_given_skin.vtp, or None where there is no such file."""
-    file = pathlib.Path(file)
-    if not file.is_file():
+def read_given(h5):
+    """The skin that the scene named, of an open result; None where that was solved itself."""
+    if "given_skin" not in h5:
         return None
-    with reading(file, "the given skin of a result"):
-        found = {item.get("Name"): np.frombuffer(
-            base64.b64decode(item.text)[8:], "<f8" if item.get("type") == "Float64" else "<i8")
-            for item in xml.etree.ElementTree.parse(file).iter("DataArray")}
-        found |= {name: found[name].reshape(-1, 3) for name in ("Points", "displacement", "connectivity")}
-        before = read_places(found, "Points")
-        return Skin(before, before + read_places(found, "displacement", len(before)),
-                    read_rows(found, "connectivity", len(before)), found["solved"])
+    group = h5["given_skin"]
+    before = read_places(group, "points")
+    return Skin(before, before + read_places(group, "displacement", len(before)),
+                read_rows(group, "triangles", len(before)), group["solved"][:])
 
 
 def solved_skin(h5, step=None):
@@ -114,10 +105,10 @@ def denser(places):
     return np.concatenate([places, (places[one] + places[other]) / 2])
 
 
-def shown_skin(h5, name):
-    """The skin to show of the open result NAME.h5."""
+def shown_skin(h5):
+    """The skin to show of an open result."""
     solved, _ = solved_skin(h5)
-    given = read_given(name + "_given_skin.vtp")
+    given = read_given(h5)
     return opened(given, solved) if given else solved
 
 

@@ -9,7 +9,6 @@ import numpy as np
 from sheet.landmarks import Parts, place_in_words
 
 LARGE_VOLUME, LARGE_ERROR = 0.2, 0.5  # relative, mm: beyond, the page warns
-RIM_MOVES = 1.0  # mm: skin that moves by more where the solved part ends
 PUBLISHED = (
     ("whole face", "0.9 ± 0.3 mm on average, 90 % of it within 1.9 mm", "Liebregts 2015, 100 patients"),
     ("regions", "0.7 to 1.4 mm on average, the lower lip worst", "Lee 2021, 10 patients"),
@@ -73,7 +72,6 @@ def cautions(result, known, parts, guessed):
         yield (f"Tissue is {kind} by {100 * end['volume_error_max']:.0f} % of its volume "
                f"{place_in_words(result.places[worst], known, parts)}: less certain there.")
     yield from summary_cautions(result, known, parts)
-    yield from rim_caution(result, known, parts)
     yield from mesh_caution(result, parts)
     if guessed:
         yield ("Not all landmarks were given: " + ", ".join(guessed) + " were found by the shape of "
@@ -88,18 +86,6 @@ def summary_cautions(result, known, parts):
         told = f"{before}{where}{after}".replace("THE REST POSITION", "the rest position")
         line = told if name == "warning" else f"{name}: {told}"
         yield f"{line[0].upper()}{line[1:]}."
-
-
-def rim_caution(result, known, parts):
-    skin = result.given
-    if skin is None:
-        return
-    strip = np.flatnonzero((skin.solved > 0) & (skin.solved < 1))
-    if len(strip) and skin.movement[strip].max() > RIM_MOVES:
-        worst = strip[np.argmax(skin.movement[strip])]
-        yield (f"The computed part of the skin ends where it still moves by "
-               f"{skin.movement[worst]:.1f} mm, {place_in_words(skin.before[worst], known, parts)}: "
-               "less certain there.")
 
 
 def mesh_caution(result, parts):

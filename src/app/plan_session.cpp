@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <list>
 
+#include "given_skin_file.h"
 #include "job.h"
 #include "plan_pieces.h"
 #include "repose/app/settings.h"
@@ -270,6 +271,8 @@ void PlanSession::write(const std::filesystem::path& name) {
                            discrete::NaturalRows::of_model(s.comm, s.job.local_model));
   file.append(s.last->first, s.last->second);
   file.commit();
+  const SolvedSkin skin(s.comm, s.job);
+  write_given_skin(s.comm, s.job, name.string(), skin, skin.points_at(s.last->second.position));
 }
 
 }  // namespace repose::app

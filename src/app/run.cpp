@@ -13,12 +13,13 @@
 #include <optional>
 
 #include "bone_through_skin.h"
+#include "given_skin_file.h"
 #include "movement.h"
+#include "moving_border.h"
 #include "phase.h"
 #include "plan_pieces.h"
 #include "report.h"
 #include "repose/adapt/discretization.h"
-#include "repose/adapt/given_skin.h"
 #include "repose/base/agreement.h"
 #include "repose/base/interrupt.h"
 #include "repose/base/whole_file.h"
@@ -115,7 +116,6 @@ class Run {
   solve::Summary search(Writer& writer);
   std::optional<PathCheck> verify(const solve::Summary& summary, const Writer& writer);
   std::string describe_folds(const model::StepNumbers& last, const Writer& writer) const;
-  std::string write_given_skin(const SolvedSkin& skin, const std::vector<Vec3>& now) const;
   std::string describe_sensitivity(const solve::Summary& summary, const Writer& writer);
   std::string describe_answer(const SolvedSkin& skin, const std::vector<Vec3>& now,
                               const solve::Summary& summary, const Writer& writer) const;
@@ -184,7 +184,7 @@ std::optional<base::Exit> Run::restart(const std::filesystem::path& file) {
   if (!done) return {};
   copy_result(file);
   const SolvedSkin skin(comm, job_);
-  print(write_given_skin(skin, skin.points_at(start_.position)));
+  print(write_given_skin(comm, job_, name_, skin, skin.points_at(start_.position)));
   return folded ? base::Exit::not_converged : base::Exit::done;
 }
 
@@ -271,24 +271,6 @@ std::optional<PathCheck> Run::verify(const solve::Summary& summary, const Writer
   return check;
 }
 
-/// Writes the displacement of the given skin, in the place of which another was solved, to
-/// NAME_given_skin.vtp and into the result. `now` are the points of the solved skin. Collective.
-std::string Run::write_given_skin(const SolvedSkin& skin, const std::vector<Vec3>& now) const {
-  if (!job_.remeshed) return "";
-  const std::string file = name_ + results::given_skin_ending;
-  base::on_root(comm, [&] {
-    std::vector<Vec3> displacement(now.size());
-    for (size_t i = 0; i < now.size(); ++i) displacement[i] = now[i] - skin.initial().points[i];
-    const surface::Surface& given = *job_.anatomy->given_skin;
-    const surface::PointData data =
-        adapt::displacement_of_given(given, skin.initial(), displacement);
-    surface::write_surface(file, given, data);
-    results::add_given_skin(name_ + ".h5", {given.points, given.triangles, data.vectors[0].values,
-                                            data.fields[0].values});
-  });
-  return report_row("given skin", file + ", and in the result: its vertices, with displacement");
-}
-
 /// Describes the change of the result under varied assumptions. Collective.
 std::string Run::describe_sensitivity(const solve::Summary& summary, const Writer& writer) {
   if (!strategy_.sensitivity || !summary.path.complete()) return "";
@@ -328,7 +310,7 @@ base::Exit Run::solve() {
   const bool folded = summary.last.inverted_prisms > 0 && !folds_allowed_;
   const std::string folds = folded ? describe_folds(summary.last, writer) : "";
   const std::vector<Vec3> now = skin.points_at(writer.slab());
-  const std::string given = write_given_skin(skin, now);
+  const std::string given = write_given_skin(comm, job_, name_, skin, now);
   stages_.end("write");
   const std::optional<PathCheck> path = verify(summary, writer);
   const std::string sensitivity = describe_sensitivity(summary, writer);
@@ -338,6 +320,7 @@ base::Exit Run::solve() {
     if (summary.path.complete())
       skin_report =
           describe_bone_through_skin(skin.initial(), now, job_.local_model.global_metadata) +
+          (job_.anatomy ? describe_moving_border(skin.initial(), now) : "") +
           skin.describe_self_contact(now);
   });
   const std::string text =

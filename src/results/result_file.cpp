@@ -8,6 +8,7 @@
 #include "repose/base/log.h"
 #include "repose/base/program.h"
 #include "repose/results/model_file.h"
+#include "repose/results/run_files.h"
 #include "step_writer.h"
 #include "vtkhdf.h"
 
@@ -257,6 +258,8 @@ void ResultFile::commit() {
     s.part.continue_in_copy();
     s.add_vtkhdf();
     const auto documents = s.views.describe(s.name);
+    std::error_code absent;
+    std::filesystem::remove(s.name.string() + given_skin_ending, absent);
     s.part.commit();
     for (const auto& document : documents) document->commit();
   });

@@ -9,6 +9,7 @@ import sys
 import threading
 import time
 
+import h5py
 import numpy as np
 import pytest
 from conftest import PROJECT, programs
@@ -197,6 +198,17 @@ def test_a_full_result_passes_the_check(session, run, tmp_path):
     assert result.returncode == 0, result
     mesh = face.mesh()
     assert mesh.points.shape == session.initial.shape
+
+
+def test_a_full_result_holds_the_given_skin(tmp_path):
+    text = SCENE.read_text().replace(": head_", f": {SCENE.parent}/head_").replace("  layers: 4", "  layers: 2\n  edge: 8")
+    (tmp_path / "plan.yaml").write_text(text)
+    with repose.Session(tmp_path / "plan.yaml", program=programs() / "repose-live") as coarse:
+        coarse.solve(B, accuracy=1)
+        coarse.write(tmp_path / "plan")
+    with h5py.File(tmp_path / "plan.h5") as h5:
+        assert np.linalg.norm(h5["given_skin/displacement"][:], axis=1).max() > 3
+    assert (tmp_path / "plan_given_skin.vtp").is_file()
 
 
 def test_faces_are_meshes_of_pyvista(session):

@@ -323,7 +323,7 @@ def skin_to_hand_back(h5, result):
     from sheet.shown_skin import matching_rows, shown_skin, solved_skin
     step = h5["step"][sorted(h5["step"])[-1]]
     solved, used = solved_skin(h5)
-    skin = shown_skin(h5, str(result).removesuffix(".h5"))
+    skin = shown_skin(h5)
     arrays = {"displacement": skin.after - skin.before, "displacement_magnitude": skin.movement}
     error, of_mesh = step.attrs["displacement_error"], step.attrs.get("discretisation_error")
     unsure = np.full(len(used), of_mesh or 0.0)

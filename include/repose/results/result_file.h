@@ -52,7 +52,8 @@ class ResultFile {
   /// The path has ended: a last step at a load below 1 says that it has not converged, as in
   /// save(). fsyncs, renames to NAME.h5 and writes NAME_tissue.xdmf, NAME_springs.xdmf,
   /// NAME_skin.xdmf and NAME_bones.xdmf (each a part, then renamed) for what the model has; one of
-  /// an earlier run that would describe nothing is removed. Nothing may be appended afterwards.
+  /// an earlier run that would describe nothing is removed, as is NAME_given_skin.vtp. Nothing may
+  /// be appended afterwards.
   void commit();
 
  private:

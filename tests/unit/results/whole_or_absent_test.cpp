@@ -29,6 +29,13 @@ TEST(WholeOrAbsent, CommitLeavesTheResultAndItsDocuments) {
             "a.h5 a_blocks.xdmf a_bones.xdmf a_skin.xdmf a_springs.xdmf a_tissue.xdmf");
 }
 
+TEST(WholeOrAbsent, CommitRemovesTheGivenSkinOfAnEarlierRun) {
+  const Folder folder;
+  std::ofstream(folder.path("a_given_skin.vtp")) << "of another plan";
+  write_small_result(folder.path("a"), small_model());
+  EXPECT_FALSE(std::filesystem::exists(folder.path("a_given_skin.vtp")));
+}
+
 TEST(WholeOrAbsent, NothingIsLeftWithoutCommit) {
   const Folder folder;
   const model::Model m = small_model();
