@@ -83,6 +83,11 @@ void check_order(const Value& file, const Landmarks& landmarks) {
 
 }  // namespace
 
+void check_frame(const Value& file, const Landmarks& landmarks) {
+  check_front(file, landmarks);
+  check_unit(file, landmarks);
+}
+
 AnatomyPlan read_anatomy(const Value& value) {
   const Map map(value);
   const Value file = map.at("landmarks");
@@ -90,9 +95,8 @@ AnatomyPlan read_anatomy(const Value& value) {
   plan.file = file.file();
   plan.landmarks = with_standard_names(landmarks_by_name(plan.file), plan.file.string());
   check_names(file, plan.landmarks);
-  check_front(file, plan.landmarks);
+  check_frame(file, plan.landmarks);
   check_sides(file, plan.landmarks);
-  check_unit(file, plan.landmarks);
   check_order(file, plan.landmarks);
   plan.axes = head_axes(plan.landmarks);
   if (const auto lips = map.find("lips")) plan.part_lips = lips->choice() == 0;

@@ -316,6 +316,16 @@ double read_tearing(const Value& value, const Scene& scene) {
   return limit;
 }
 
+/// Takes landmarks by the names of their file and, where these are spellings of standard names, by
+/// those, too.
+void take_landmarks(const Value& file, Scene& scene) {
+  const Landmarks named = landmarks_by_name(file.file());
+  const Landmarks standard = with_standard_names(named, file.file().string());
+  check_frame(file, standard);
+  for (const Landmarks* landmarks : {&standard, &named})
+    for (const auto& [name, place] : *landmarks) scene.landmarks[name] = place;
+}
+
 void read_surroundings(Scene& scene, const Map& map) {
   if (const auto gravity = map.find("gravity")) {
     scene.gravity = gravity->vector();
@@ -394,9 +404,7 @@ Scene read_scene(const std::filesystem::path& file, const SceneChanges& changes)
   if (const auto cuts = map.find("osteotomies")) read_osteotomies(*cuts, scene);
   scene.moves.resize(scene.bones.size());
   if (scene.anatomy) scene.landmarks = scene.anatomy->landmarks;
-  if (const auto named = map.find("landmarks"))
-    for (const auto& [name, place] : landmarks_by_name(named->file()))
-      scene.landmarks[name] = place;
+  if (const auto named = map.find("landmarks")) take_landmarks(*named, scene);
   if (const auto moves = map.find("moves")) read_moves(*moves, scene.landmarks, scene);
   if (const auto collision = map.find("collision")) scene.collision = read_collision(*collision);
   if (const auto plan = map.find("plan")) scene.plan = read_plan(*plan, scene);

@@ -14,6 +14,8 @@ namespace repose::scene {
 /// cannot be those of a head in LPS: left and right exchanged, RAS, one of a pair missing, an order
 /// from above to below that no head has.
 AnatomyPlan read_anatomy(const Value& value);
+/// Refuses landmarks by standard names that are in another frame (RAS) or unit.
+void check_frame(const Value& file, const Landmarks& landmarks);
 
 /// Reads anatomy.septum, if there, into the first region of the scene's material: the septum's free
 /// edges between the landmarks of `scene.anatomy`. Adds a remark. Refuses springs, and a scene

@@ -286,6 +286,23 @@ RigidMotion landmark_move(const std::string& form, std::vector<std::string>* rem
   return scene.moves[0];
 }
 
+TEST(Scene, LandmarksOfOtherSpellingsHaveTheirStandardNamesToo) {
+  const Folder folder;
+  folder.write("points.json", "{\"Pogonion Soft\": [0, -90, -60], \"wart\": [1, 2, 3]}");
+  const Scene scene = read_scene(folder.write("s.yaml", minimal + "landmarks: points.json\n"));
+  EXPECT_EQ(scene.landmarks.size(), 3u);
+  EXPECT_EQ(scene.landmarks.at("pogonion_soft"), scene.landmarks.at("Pogonion Soft"));
+}
+
+TEST(Scene, LandmarksInRasAreRefused) {
+  const Folder folder;
+  folder.write("points.json",
+               "{\"condyle_right_center\": [50, 0, 0], \"condyle_left_center\": [-50, 0, 0], "
+               "\"stomion\": [0, 90, -20]}");
+  const std::string scene = folder.write("s.yaml", minimal + "landmarks: points.json\n");
+  EXPECT_NE(refusal([&] { read_scene(scene); }).find("as in RAS"), std::string::npos);
+}
+
 TEST(Scene, LandmarksGoToTheirPlaces) {
   expect_near(landmark_move("landmark: {from: chin, to: [1, 2, 9]}").apply({0, 0, 0}), {0, 0, 6});
   const RigidMotion two =
