@@ -5,6 +5,7 @@ import csv
 import json
 import math
 import pathlib
+import re
 
 import numpy as np
 
@@ -13,24 +14,40 @@ from sheet.script import Unusable, is_number, reading
 RISE = math.radians(14)  # of nasion and upper incisors as seen from the condyles, together
 NEAR = 5.0  # mm: a landmark farther from skin and bones belongs to neither
 BEYOND = "skin beyond the solved part"
-NAMES = {"glabella": ("glabella_soft", "glabella", "g'"), "nasion": ("nasion_soft", "n'"),
-         "pronasale": ("pronasale", "prn"), "columella": ("columella", "cm"),
-         "subnasale": ("subnasale", "sn"), "upper lip": ("upper_lip", "labrale_superius", "ls"),
-         "upper stomion": ("stomion_superius", "stms"), "lower stomion": ("stomion_inferius", "stmi"),
-         "lower lip": ("lower_lip", "labrale_inferius", "li"),
-         "sublabiale": ("sublabiale", "mentolabial_sulcus", "b_soft", "b'"),
-         "pogonion": ("pogonion_soft", "soft_pogonion", "pog'"),
-         "gnathion": ("gnathion_soft", "soft_gnathion", "gn'"),
-         "menton": ("menton_soft", "soft_menton", "me'"), "throat": ("throat", "cervical_point", "c'")}
-BONES = {"upper incisor": ("upper_incisor_edge", "u1"), "lower incisor": ("lower_incisor_edge", "l1"),
-         "nasal spine": ("nasal_spine", "anterior_nasal_spine", "ans"), "chin bone": ("pogonion_bone", "pog")}
+STANDARD = {  # {name: other spellings}; first those of src/scene/landmark_names.cpp, then the page's own
+    "nasion_bone": ("nasion", "n", "na"), "nasal_spine": ("anterior nasal spine", "ans", "sp"),
+    "a_point": ("a", "point a", "subspinale", "ss"),
+    "upper_incisor_edge": ("upper incisal edge", "upper incisor", "u1", "is"),
+    "lower_incisor_edge": ("lower incisal edge", "lower incisor", "l1", "ii"),
+    "b_point": ("b", "point b", "supramentale", "sm"), "pogonion_bone": ("pogonion", "pog", "pg"),
+    "menton_bone": ("menton", "me"),
+    "condyle_right_center": ("condyle right", "right condyle", "condylion right", "co r"),
+    "condyle_left_center": ("condyle left", "left condyle", "condylion left", "co l"),
+    "gonion_right": ("right gonion", "go r"), "gonion_left": ("left gonion", "go l"),
+    "nasion_soft": ("nasion'", "n'", "soft nasion"), "pronasale": ("prn", "pn"), "subnasale": ("sn",),
+    "upper_lip": ("labrale superius", "ls", "upper lip point"), "stomion": ("sto", "stm", "st"),
+    "lower_lip": ("labrale inferius", "li", "lower lip point"),
+    "mouth_right": ("mouth corner right", "right mouth corner", "cheilion right", "ch r"),
+    "mouth_left": ("mouth corner left", "left mouth corner", "cheilion left", "ch l"),
+    "b_soft": ("b'", "si", "sublabiale", "sl", "mentolabial sulcus"),
+    "pogonion_soft": ("pogonion'", "pog'", "pg'", "soft pogonion", "soft tissue pogonion"),
+    "menton_soft": ("menton'", "me'", "soft menton", "soft tissue menton"),
+    "glabella_soft": ("glabella", "g'"), "columella": ("cm",), "stomion_superius": ("stms",),
+    "stomion_inferius": ("stmi",), "gnathion_soft": ("gn'", "soft gnathion"), "throat": ("cervical point", "c'")}
+NAMES = {"glabella": "glabella_soft", "nasion": "nasion_soft", "pronasale": "pronasale", "columella": "columella",
+         "subnasale": "subnasale", "upper lip": "upper_lip", "upper stomion": "stomion_superius",
+         "lower stomion": "stomion_inferius", "lower lip": "lower_lip", "sublabiale": "b_soft",
+         "pogonion": "pogonion_soft", "gnathion": "gnathion_soft", "menton": "menton_soft", "throat": "throat"}
+BONES = {"upper incisor": "upper_incisor_edge", "lower incisor": "lower_incisor_edge",
+         "nasal spine": "nasal_spine", "chin bone": "pogonion_bone"}
 ABOVE_CHIN = ("glabella", "nasion", "pronasale", "columella", "subnasale", "upper lip", "lower lip")
 MIDLINE = (*ABOVE_CHIN, "sublabiale", "pogonion", "menton")
 
 
 def read_landmarks(file):
     """{name: position} in LPS, as the programs read them (src/scene/landmarks.cpp): 3D Slicer's .mrk.json
-    and .fcsv, JSON {"name": [x, y, z], …}, and .csv of name, x, y, z."""
+    and .fcsv, JSON {"name": [x, y, z], …}, and .csv of name, x, y, z. Spellings of STANDARD become its
+    names; other names stay as they are."""
     ending = pathlib.Path(file).suffix.lower()
     if ending not in (".json", ".fcsv", ".csv"):
         raise Unusable(f"{file}: the ending is none of .mrk.json, .json, .fcsv and .csv")
@@ -42,7 +59,28 @@ def read_landmarks(file):
                 raise ValueError(f"landmark '{name}' has a coordinate that is no finite number")
     if not found:
         raise Unusable(f"{file}: holds no landmark that is placed")
-    return found
+    return with_standard_names(found, file)
+
+
+def plain(name):
+    """Lower case, with single blanks between words and ' for a prime."""
+    return " ".join(re.split(r"[ _.\t-]+", name.lower().replace("′", "'"))).strip()
+
+
+SPELLINGS = {plain(spelling): name for name, others in STANDARD.items() for spelling in (name, *others)}
+
+
+def with_standard_names(landmarks, file):
+    """The landmarks by names of STANDARD where they have one; refuses two of one name at different places."""
+    renamed, spelled = {}, {}
+    for name, position in landmarks.items():
+        key = SPELLINGS.get(plain(name), name)
+        apart = np.linalg.norm(renamed.setdefault(key, position) - position)
+        if apart > 1e-3:
+            raise Unusable(f"{file}: landmarks '{spelled[key]}' and '{name}' are both {key}, {apart:.1f} mm apart; "
+                           "remove one of them")
+        spelled[key] = name
+    return renamed
 
 
 def in_lps(frame, position):
@@ -190,14 +228,9 @@ def place_landmarks(result, landmarks):
 def known_places(placed, names=None):
     """{name: (before, after)} of the landmarks on the skin by NAMES, or of BONES on bones."""
     on_skin = names is None
-    by_name = {mark["name"].lower(): mark for mark in placed
+    by_name = {mark["name"]: (mark["before"], mark["after"]) for mark in placed
                if (mark["on"] in ("skin", BEYOND)) == on_skin}
-    found = {}
-    for name, others in (names or NAMES).items():
-        for other in others:
-            if other in by_name:
-                found.setdefault(name, (by_name[other]["before"], by_name[other]["after"]))
-    return found
+    return {name: by_name[standard] for name, standard in (names or NAMES).items() if standard in by_name}
 
 
 # ----- by the shape of the profile

@@ -242,8 +242,7 @@ def spoken(name):
 
 def moved_bones(plan):
     """[(name, place, shift there, rotation)] of the bones that move."""
-    marks = {name: mark for name, others in BONES.items() for mark in plan.placed
-             if mark["name"].lower() in others}
+    marks = {name: mark for name, standard in BONES.items() for mark in plan.placed if mark["name"] == standard}
     found = []
     for bone in plan.result.bones:
         turn, shift = bone["motion"]

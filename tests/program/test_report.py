@@ -442,6 +442,19 @@ def test_bones_landmarks_go_with_the_bone(report, opened, tmp_path):
     assert "stray" in page.text["p"]
 
 
+def test_landmarks_in_other_spellings_make_the_same_page(report, opened, tmp_path):
+    marks = json.loads(MARKS.read_text())
+    for point in marks["markups"][0]["controlPoints"]:
+        point["label"] = {"lower_incisor_edge": "L1", "pogonion_soft": "Pog\u2032"}.get(
+            point["label"], point["label"].replace("_", " ").title())
+    (tmp_path / "marks.json").write_text(json.dumps(marks))
+    standard, spelled = (page_of(report, tmp_path, opened, "-landmarks", file)
+                         for file in (MARKS, tmp_path / "marks.json"))
+    assert "axes of the head by its condyles, nasion and upper incisors" in spelled.text["p"]
+    shared = ("mandible", "Chin", "pogonion soft", "lower incisor edge", "facial convexity")
+    assert [spelled.rows[row] for row in shared] == [standard.rows[row] for row in shared]
+
+
 def test_the_scene_is_shown_and_names_the_landmarks(report, opened, tmp_path):
     scene = SCENE.read_text() + f"landmarks: {MARKS}\n# <b>\n"
     (tmp_path / "plan.yaml").write_text(scene)

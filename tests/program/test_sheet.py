@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import resource
 import struct
 import subprocess
@@ -18,7 +19,7 @@ import live  # noqa: E402
 from repose.scene import Scene  # noqa: E402
 from sheet import tables  # noqa: E402
 from sheet.appearance import read_appearance, read_ply  # noqa: E402
-from sheet.landmarks import on_surface, place_landmarks, read_landmarks  # noqa: E402
+from sheet.landmarks import STANDARD, on_surface, place_landmarks, read_landmarks  # noqa: E402
 from sheet.measures import MEASURES, read_norms  # noqa: E402
 from sheet.meshes import coarser  # noqa: E402
 from sheet.page import plan_table  # noqa: E402
@@ -162,6 +163,28 @@ def test_files_that_are_no_landmarks_are_refused(tmp_path, name):
     (tmp_path / name).write_text(REFUSED[name])
     with pytest.raises(Unusable, match=f"{name}: "):
         read_landmarks(tmp_path / name)
+
+
+def test_names_of_landmarks_are_those_of_the_programs():
+    text = (PROJECT / "src/scene/landmark_names.cpp").read_text()
+    listed = {name: tuple(re.findall(r'"([^"]+)"', others))
+              for name, others in re.findall(r'\{"(\w+)",\s*\{([^}]*)\}', text)}
+    assert len(listed) > 20 and listed == {name: STANDARD[name] for name in listed}
+
+
+@pytest.mark.parametrize("spelling, name", [
+    ("Condyle Right-Center", "condyle_right_center"), ("Right Condyle", "condyle_right_center"),
+    (" Pog\u2032", "pogonion_soft"), ("N", "nasion_bone"), ("GLABELLA", "glabella_soft"), ("L1", "lower_incisor_edge"),
+    ("Soft_Tissue.Pogonion", "pogonion_soft"), ("Orbitale Left", "Orbitale Left"), ("U 1", "U 1")])
+def test_names_of_landmarks_are_read_in_any_spelling(tmp_path, spelling, name):
+    (tmp_path / "marks.json").write_text(json.dumps({spelling: [1, 2, 3], name: [1, 2, 3]}))
+    assert list(read_landmarks(tmp_path / "marks.json")) == [name]
+
+
+def test_two_landmarks_of_one_name_are_refused(tmp_path):
+    (tmp_path / "marks.json").write_text('{"Pog": [0, 0, 0], "pogonion bone": [0, 0, 3]}')
+    with pytest.raises(Unusable, match="'Pog' and 'pogonion bone' are both pogonion_bone, 3.0 mm apart; remove one"):
+        read_landmarks(tmp_path / "marks.json")
 
 
 # ----- text as Windows saves it
