@@ -66,8 +66,9 @@ def main():
     chosen = arguments()
     norms = measures.read_norms(chosen.norms)
     marks = landmarks.read_landmarks(chosen.landmarks) if chosen.landmarks else {}
-    axes, frame = landmarks.head_axes(marks)
     results = [Result(f"{name}.h5") for name in chosen.names]
+    landmarks.require_same_head(results[0], marks, chosen.landmarks)
+    axes, frame = landmarks.head_axes(marks)
     appearance = read_appearance(chosen.skin, results[0].skin) if chosen.skin else None
     if chosen.colors and not appearance:
         refuse(f"{chosen.colors}: has neither colors nor a texture that can be shown; give a .ply with colors, or "

@@ -13,6 +13,7 @@ from sheet.script import Unusable, is_number, reading
 
 RISE = math.radians(14)  # of nasion and upper incisors as seen from the condyles, together
 NEAR = 5.0  # mm: a landmark farther from skin and bones belongs to neither
+OFF_SURFACE = 15.0  # mm, farther than a landmark is ever placed beside it, as in src/anatomy/same_head.cpp
 BEYOND = "skin beyond the solved part"
 STANDARD = {  # {name: other spellings}; first those of src/scene/landmark_names.cpp, then the page's own
     "nasion_bone": ("nasion", "n", "na"), "nasal_spine": ("anterior nasal spine", "ans", "sp"),
@@ -141,15 +142,35 @@ def fields(line):
     return [field.strip() for field in next(csv.reader([line], skipinitialspace=True))]
 
 
+OF_AXES = "condyle_right_center", "condyle_left_center", "nasion_bone", "upper_incisor_edge"
+
+
+def require_same_head(result, landmarks, file):
+    """Refuses landmarks of another head or in another frame, which would turn the page."""
+    right, left = (landmarks.get(name) for name in OF_AXES[:2])
+    if right is not None and left is not None and right[0] >= left[0]:
+        raise Unusable(f"{file}: has condyle_right_center at x = {right[0]:.1f} mm and condyle_left_center at "
+                       f"x = {left[0]:.1f} mm, but +x is the patient's left: they are exchanged, or the landmarks "
+                       "are in RAS")
+    _, lost = place_landmarks(result, landmarks)
+    known = [name for name in landmarks if name in STANDARD and not name.endswith("_center")]  # inside of bone
+    off = [name for name in known if name in lost]
+    if 2 * len(off) > len(known):
+        raise Unusable(f"{file}: {len(off)} of {len(known)} landmarks on skin and bones lie farther than {NEAR:g} mm "
+                       f"from them, {off[0]} {lost[off[0]]:.0f} mm: they are those of another head or in another "
+                       "frame; give those of this head, in LPS and mm")
+    for name in OF_AXES:
+        if lost.get(name, 0) > OFF_SURFACE:
+            raise Unusable(f"{file}: landmark {name} lies {lost[name]:.0f} mm from skin and bones, allowed are "
+                           f"{OFF_SURFACE:g} mm, since the page is turned by it; place it again or remove it")
+
+
 def head_axes(landmarks):
     """Left, back and up of the head as rows, those of templates and clinical moves
     (docs/guide/anatomy.md), and what they follow from; the scan's own without the condyles."""
-    right, left, nasion, edge = (landmarks.get(name) for name in (
-        "condyle_right_center", "condyle_left_center", "nasion_bone", "upper_incisor_edge"))
+    right, left, nasion, edge = (landmarks.get(name) for name in OF_AXES)
     if right is None or left is None:
         return np.eye(3), "the scan: no landmarks of the condyles are given"
-    if not np.linalg.norm((left - right)[[0, 2]]) > 0:
-        return np.eye(3), "the scan: the condyles are not beside each other"
     across = (left - right) / np.linalg.norm(left - right)
     back = np.array([0, 1, 0]) - across[1] * across
     axes = np.stack([across, back / np.linalg.norm(back), np.cross(across, back / np.linalg.norm(back))])
@@ -201,8 +222,8 @@ def nearest_weights(triangles, point):
 
 def place_landmarks(result, landmarks):
     """[{name, on, before, after}] of those on the skin, on a bone (with which they go) or on the
-    given skin beyond the one that was solved; and the names of the others."""
-    placed, lost = [], []
+    given skin beyond the one that was solved; and {name: distance in mm} of the others."""
+    placed, lost = [], {}
     for name, point in landmarks.items():
         skin = result.solved
         before, after, distance = on_surface(skin.before, skin.after, skin.corners, point)
@@ -221,7 +242,7 @@ def place_landmarks(result, landmarks):
         if distance <= NEAR:
             placed.append(best)
         else:
-            lost.append(name)
+            lost[name] = distance
     return placed, lost
 
 

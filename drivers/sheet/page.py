@@ -388,7 +388,7 @@ def measure_table(plans, norms):
 
 
 def landmark_table(plan):
-    if not plan.placed:
+    if not plan.placed and not plan.lost:
         return "<p>None are given.</p>"
     rows, rest = [], ", ".join(name.replace("_", " ") for name in plan.lost)
     for mark in plan.placed:
@@ -397,7 +397,7 @@ def landmark_table(plan):
         rows.append((mark["name"].replace("_", " "), mark["on"], *parts))
     head = ("landmark", "on", "forward, mm", "to the left, mm", "up, mm", "in all, mm")
     lost_ones = f"<p>Farther than {NEAR:g} mm from skin and bones: {html.escape(rest)}.</p>"
-    return table(head, rows) + (lost_ones if rest else "")
+    return (table(head, rows) if rows else "") + (lost_ones if rest else "")
 
 
 # ----- the page

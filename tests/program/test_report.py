@@ -442,6 +442,29 @@ def test_bones_landmarks_go_with_the_bone(report, opened, tmp_path):
     assert "stray" in page.text["p"]
 
 
+@pytest.mark.parametrize("change, part", [
+    (lambda name, at: at * (-1, -1, 1), "x = 50.0 mm and condyle_left_center at x = -50.0 mm, but +x is the patient's"),
+    (lambda name, at: at * (1, -1, 1), "13 of 15 landmarks on skin and bones lie farther than 5 mm from them, pronasale"),
+    (lambda name, at: at * 1000, "15 of 15 landmarks on skin and bones"),
+    (lambda name, at: at - (0, 99 * (name == "nasion_bone"), 0), "nasion_bone lies 82 mm from skin and bones, allowed")],
+    ids=["RAS", "back to front", "µm", "nasion"])
+def test_landmarks_off_the_head_are_refused(report, opened, tmp_path, change, part):
+    marks = json.loads(MARKS.read_text())
+    for point in marks["markups"][0]["controlPoints"]:
+        point["position"] = change(point["label"], np.array(point["position"])).tolist()
+    (tmp_path / "marks.json").write_text(json.dumps(marks))
+    refused = report(opened, "-landmarks", "marks.json")
+    assert (refused.returncode, refused.stdout, len(refused.stderr.splitlines())) == (1, "", 1), refused.stderr
+    assert refused.stderr.startswith("report.py: marks.json: ") and part in refused.stderr
+
+
+def test_landmarks_that_are_all_left_out_are_named(report, opened, tmp_path):
+    (tmp_path / "marks.json").write_text('{"in the air": [0, -400, 0]}')
+    page = page_of(report, tmp_path, opened, "-landmarks", tmp_path / "marks.json")
+    assert "Farther than 5 mm from skin and bones: in the air." in page.text["p"]
+    assert "None are given." not in page.text["p"]
+
+
 def test_landmarks_in_other_spellings_make_the_same_page(report, opened, tmp_path):
     marks = json.loads(MARKS.read_text())
     for point in marks["markups"][0]["controlPoints"]:
