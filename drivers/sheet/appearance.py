@@ -9,7 +9,7 @@ import numpy as np
 
 from sheet.ply import Header
 from sheet.script import Unusable, reading
-from sheet.shown_skin import Skin, matching_rows, nearest
+from sheet.shown_skin import FARTHEST, Skin, matching_rows, median_distance, nearest
 
 LARGEST_IMAGE = 2_000_000  # bytes: the page must stay below 5 MB
 
@@ -32,8 +32,22 @@ def read_appearance(file, skin):
     with reading(file, "a mesh of the skin"):
         if ending == ".ply":
             points, colors = read_ply(file)
-            return None if colors is None else Appearance(skin, colors[nearest(points, skin.before)])
+            return None if colors is None else colored(points, colors, skin, file)
         return read_obj(file, skin) if ending == ".obj" else None
+
+
+def colored(points, colors, skin, file):
+    """The skin with the colors of the nearest vertices of a mesh."""
+    require_of_skin(points, skin, file)
+    return Appearance(skin, colors[nearest(points, skin.before)])
+
+
+def require_of_skin(points, skin, file):
+    """Refuses a mesh of another skin, or in another frame or unit; one of them may be a part of the other."""
+    distance = min(median_distance(skin.before, points), median_distance(points, skin.before))
+    if distance > FARTHEST:
+        raise Unusable(f"{file}: lies {distance:.0f} mm from the skin of the result in the median, allowed are "
+                       f"{FARTHEST:g} mm; give a mesh of this skin, in LPS and mm")
 
 
 def read_ply(file):
@@ -73,10 +87,10 @@ def read_obj(file, skin):
             library = line.split(maxsplit=1)[1].strip()
     image = texture(pathlib.Path(file), library) if uv and library else None
     if image and all(len(corner) > 1 and corner[1] for face in faces for corner in face):
-        return textured(points, uv, faces, image, skin)
+        return textured(points, uv, faces, image, skin, file)
     if points and len(points[0]) >= 6:
         rows = np.array([point[:6] for point in points])
-        return Appearance(skin, 255 * rows[nearest(rows[:, :3], skin.before), 3:])
+        return colored(rows[:, :3], 255 * rows[:, 3:], skin, file)
     return None
 
 
@@ -97,12 +111,13 @@ def texture(file, library):
     return f"data:image/{kind};base64," + base64.b64encode(image.read_bytes()).decode()
 
 
-def textured(points, uv, faces, image, skin):
+def textured(points, uv, faces, image, skin, file):
     """A vertex for each pair of place and texture coordinate."""
     flat = np.array([[corner[:2] for corner in face] for face in faces]).reshape(-1, 2)
     flat = np.where(flat < 0, flat + [len(points), len(uv)], flat - 1)
     pairs, corners = np.unique(flat, axis=0, return_inverse=True)
     before = np.array([point[:3] for point in points])[pairs[:, 0]]
+    require_of_skin(before, skin, file)
     shown = Skin(before, before, corners.reshape(-1, 3), np.zeros(len(before)))
     near = matching_rows(skin, shown)
     shown = Skin(before, before + (skin.after - skin.before)[near], shown.corners, skin.solved[near])

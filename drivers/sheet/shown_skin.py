@@ -6,6 +6,7 @@ import numpy as np
 from sheet.meshes import edges
 from sheet.script import Unusable
 
+FARTHEST = 5.0     # mm, in the median: a mesh farther from a skin is not one of it
 AROUND_CUTS = 4.0  # mm: so near to a cut the solved skin is shown, which is cut open
 SMOOTHINGS = 8     # as many neighbors from a side of a cut, whose border may be jagged
 
@@ -155,9 +156,14 @@ def matching_rows(skin, other):
     return used[found]
 
 
+def median_distance(points, places):
+    """The median distance of places, of a thousand or so, from the nearest of some points."""
+    some = places[::max(1, len(places) // 1000)]
+    return np.median(np.linalg.norm(points[nearest(points, some)] - some, axis=1))
+
+
 def rows_of_patient(skin, other, files):
     """Rows as of `matching_rows`; refuses skins of two patients, by the files of both plans."""
-    rows = matching_rows(skin, other)
-    if np.median(np.linalg.norm(skin.before[rows] - other.before, axis=1)) > 5:
+    if median_distance(skin.before, other.before) > FARTHEST:
         raise Unusable(f"{files[1]}: not the skin of {files[0]}; two plans of one patient can be compared")
-    return rows
+    return matching_rows(skin, other)

@@ -578,6 +578,25 @@ def test_colors_and_photographs_of_a_skin_are_kept(report, opened, tmp_path):
     assert np.abs(after - last(opened)["point/position"][rows]).max() < 0.02
 
 
+@pytest.mark.parametrize("change", [lambda at: at * (-1, -1, 1), lambda at: at / 1000, lambda at: at + (300, 0, 0)],
+                         ids=["RAS", "m", "elsewhere"])
+@pytest.mark.parametrize("name", ["colors.ply", "colors.obj", "photo.obj"])
+def test_a_mesh_off_the_skin_is_refused(report, opened, tmp_path, name, change):
+    model = model_of(opened)
+    rows, corners = np.unique(model["skin/points"], return_inverse=True)
+    points = change(model["point/position"][rows])
+    write_ply(tmp_path / "colors.ply", points, np.full(points.shape, 9))
+    places = [f"v {x} {y} {z}" for x, y, z in points]
+    (tmp_path / "colors.obj").write_text("\n".join(place + " 1 0 0" for place in places))
+    (tmp_path / "photo.png").write_bytes(b"\x89PNG a photograph")
+    (tmp_path / "face.mtl").write_text("map_Kd photo.png\n")
+    faces = ["f " + " ".join(f"{c}/1" for c in face) for face in corners.reshape(-1, 3) + 1]
+    (tmp_path / "photo.obj").write_text("\n".join(["mtllib face.mtl", *places, "vt 0 0", *faces]))
+    refused = report(opened, "-skin", name)
+    assert (refused.returncode, len(refused.stderr.splitlines())) == (1, 1), refused.stderr
+    assert refused.stderr.startswith(f"report.py: {name}: lies ") and "allowed are 5 mm" in refused.stderr
+
+
 @pytest.mark.parametrize("name, text", [
     ("plain.ply", "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n"
                   "end_header\n0 0 0\n"),

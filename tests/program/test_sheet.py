@@ -244,6 +244,16 @@ def test_damaged_colors_are_refused(tmp_path, body, part):
         read_appearance(tmp_path / "skin.ply", None)
 
 
+@pytest.mark.parametrize("most", ["mesh", "skin"])
+def test_colors_of_a_part_of_the_skin_are_taken(tmp_path, most):
+    part = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
+    whole = np.concatenate([part, part + 50, part + 60])
+    mesh, skin = (whole, part) if most == "mesh" else (part, whole)
+    (tmp_path / "skin.obj").write_text("".join(f"v {x} {y} {z} 0 {k} 0\n" for k, (x, y, z) in enumerate(mesh)))
+    shown = read_appearance(tmp_path / "skin.obj", Skin(skin, skin, np.array([[0, 1, 2]]), np.ones(len(skin))))
+    assert shown.colors[:3].tolist() == [[0, 0, 0], [0, 255, 0], [0, 510, 0]]
+
+
 def test_measures_of_the_profile_do_not_depend_on_the_side():
     places = {"glabella": (0, -80, 60), "subnasale": (0, -84, 0), "pronasale": (0, -98, 8), "upper lip": (0, -88, -10),
               "lower lip": (0, -86, -20), "pogonion": (0, -82, -40)}
