@@ -46,8 +46,8 @@ def require_of_skin(points, skin, file):
     """Refuses a mesh of another skin, or in another frame or unit; one of them may be a part of the other."""
     distance = min(median_distance(skin.before, points), median_distance(points, skin.before))
     if distance > FARTHEST:
-        raise Unusable(f"{file}: lies {distance:.0f} mm from the skin of the result in the median, allowed are "
-                       f"{FARTHEST:g} mm; give a mesh of this skin, in LPS and mm")
+        raise Unusable(f"{file}: lies {distance:.0f} mm from the skin of the result in the median, allowed "
+                       f"are {FARTHEST:g} mm; give a mesh of this skin, in LPS and mm")
 
 
 def read_ply(file):

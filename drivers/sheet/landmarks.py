@@ -34,11 +34,14 @@ STANDARD = {  # {name: other spellings}; first those of src/scene/landmark_names
     "pogonion_soft": ("pogonion'", "pog'", "pg'", "soft pogonion", "soft tissue pogonion"),
     "menton_soft": ("menton'", "me'", "soft menton", "soft tissue menton"),
     "glabella_soft": ("glabella", "g'"), "columella": ("cm",), "stomion_superius": ("stms",),
-    "stomion_inferius": ("stmi",), "gnathion_soft": ("gn'", "soft gnathion"), "throat": ("cervical point", "c'")}
-NAMES = {"glabella": "glabella_soft", "nasion": "nasion_soft", "pronasale": "pronasale", "columella": "columella",
-         "subnasale": "subnasale", "upper lip": "upper_lip", "upper stomion": "stomion_superius",
-         "lower stomion": "stomion_inferius", "lower lip": "lower_lip", "sublabiale": "b_soft",
-         "pogonion": "pogonion_soft", "gnathion": "gnathion_soft", "menton": "menton_soft", "throat": "throat"}
+    "stomion_inferius": ("stmi",), "gnathion_soft": ("gn'", "soft gnathion"),
+    "throat": ("cervical point", "c'")}
+NAMES = {"glabella": "glabella_soft", "nasion": "nasion_soft", "pronasale": "pronasale",
+         "columella": "columella", "subnasale": "subnasale", "upper lip": "upper_lip",
+         "upper stomion": "stomion_superius", "lower stomion": "stomion_inferius",
+         "lower lip": "lower_lip", "sublabiale": "b_soft",
+         "pogonion": "pogonion_soft", "gnathion": "gnathion_soft", "menton": "menton_soft",
+         "throat": "throat"}
 BONES = {"upper incisor": "upper_incisor_edge", "lower incisor": "lower_incisor_edge",
          "nasal spine": "nasal_spine", "chin bone": "pogonion_bone"}
 ABOVE_CHIN = ("glabella", "nasion", "pronasale", "columella", "subnasale", "upper lip", "lower lip")
@@ -78,8 +81,8 @@ def with_standard_names(landmarks, file):
         key = SPELLINGS.get(plain(name), name)
         apart = np.linalg.norm(renamed.setdefault(key, position) - position)
         if apart > 1e-3:
-            raise Unusable(f"{file}: landmarks '{spelled[key]}' and '{name}' are both {key}, {apart:.1f} mm apart; "
-                           "remove one of them")
+            raise Unusable(f"{file}: landmarks '{spelled[key]}' and '{name}' are both {key}, {apart:.1f} mm "
+                           "apart; remove one of them")
         spelled[key] = name
     return renamed
 
@@ -149,20 +152,22 @@ def require_same_head(result, landmarks, file):
     """Refuses landmarks of another head or in another frame, which would turn the page."""
     right, left = (landmarks.get(name) for name in OF_AXES[:2])
     if right is not None and left is not None and right[0] >= left[0]:
-        raise Unusable(f"{file}: has condyle_right_center at x = {right[0]:.1f} mm and condyle_left_center at "
-                       f"x = {left[0]:.1f} mm, but +x is the patient's left: they are exchanged, or the landmarks "
-                       "are in RAS")
+        raise Unusable(f"{file}: has condyle_right_center at x = {right[0]:.1f} mm and condyle_left_center "
+                       f"at x = {left[0]:.1f} mm, but +x is the patient's left: they are exchanged, or the "
+                       "landmarks are in RAS")
     _, lost = place_landmarks(result, landmarks)
-    known = [name for name in landmarks if name in STANDARD and not name.endswith("_center")]  # inside of bone
+    inside = OF_AXES[:2]  # of bone
+    known = [name for name in landmarks if name in STANDARD and name not in inside]
     off = [name for name in known if name in lost]
     if 2 * len(off) > len(known):
-        raise Unusable(f"{file}: {len(off)} of {len(known)} landmarks on skin and bones lie farther than {NEAR:g} mm "
-                       f"from them, {off[0]} {lost[off[0]]:.0f} mm: they are those of another head or in another "
-                       "frame; give those of this head, in LPS and mm")
+        raise Unusable(f"{file}: {len(off)} of {len(known)} landmarks on skin and bones lie farther than "
+                       f"{NEAR:g} mm from them, {off[0]} {lost[off[0]]:.0f} mm: they are those of another "
+                       "head or in another frame; give those of this head, in LPS and mm")
     for name in OF_AXES:
         if lost.get(name, 0) > OFF_SURFACE:
-            raise Unusable(f"{file}: landmark {name} lies {lost[name]:.0f} mm from skin and bones, allowed are "
-                           f"{OFF_SURFACE:g} mm, since the page is turned by it; place it again or remove it")
+            raise Unusable(f"{file}: landmark {name} lies {lost[name]:.0f} mm from skin and bones, allowed "
+                           f"are {OFF_SURFACE:g} mm, since the page is turned by it; place it "
+                           "again or remove it")
 
 
 def head_axes(landmarks):

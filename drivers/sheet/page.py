@@ -242,7 +242,8 @@ def spoken(name):
 
 def moved_bones(plan):
     """[(name, place, shift there, rotation)] of the bones that move."""
-    marks = {name: mark for name, standard in BONES.items() for mark in plan.placed if mark["name"] == standard}
+    marks = {name: mark for name, standard in BONES.items() for mark in plan.placed
+             if mark["name"] == standard}
     found = []
     for bone in plan.result.bones:
         turn, shift = bone["motion"]
