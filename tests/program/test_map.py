@@ -194,6 +194,75 @@ def test_a_changed_mesh_has_other_plans(tmp_path):
     assert repose.Scene(scene).fingerprint() != first
 
 
+def hashed(file):
+    return repose.Scene(file).fingerprint()
+
+
+@pytest.mark.parametrize("skin, line", [
+    ("my skin.ply", "skin: my skin.ply"), ("my skin.ply", 'skin: "my skin.ply" # the face'),
+    ("my skin.ply", "skin: 'my skin.ply'"), ("q,r.ply", "skin: q,r.ply"), ("a: #1.ply", "skin: 'a: #1.ply'"),
+    ("it's.ply", "skin: 'it''s.ply'"), ("Ä 1.ply", '"skin":"\\u00c4 1.ply"'), ("a b.ply", "skin: &face a b.ply"),
+    ("a b.ply", "- {name: skull, file: a b.ply}"), ("a b.ply", "  - a b.ply\r"), ("s.ply", "{skin:\n  s.ply}"),
+    ("a b.ply", "skin: # the patient's\n  'a b.ply'"), ("d e/s.ply", "mesh: d e/s.ply")])
+def test_a_file_is_one_of_the_scene_however_its_name_is_written(tmp_path, skin, line):
+    mesh, scene = tmp_path / skin, tmp_path / "scene.yaml"
+    mesh.parent.mkdir(exist_ok=True)
+    mesh.write_text("a")
+    scene.write_text(line + "\nmoves: []\n")
+    assert repose.Scene(scene).files() == [scene, mesh]
+    first = hashed(scene)
+    mesh.write_text("b")
+    assert hashed(scene) != first
+
+
+META, NRRD = "ObjectType = Image\nElementDataFile = ", "NRRD0004\ntype: short\ndata file: "
+
+
+@pytest.mark.parametrize("volume, content, voxels", [
+    ("v.mhd", META + "my voxels.raw", ["my voxels.raw"]), ("v.mhd", META.replace(" =", ":=") + "v.zraw\r\n", ["v.zraw"]),
+    ("v.mhd", META + "LIST\ns 1.raw\ns 2.raw\n", ["s 1.raw", "s 2.raw"]), ("v.mha", META + "LOCAL\nxyz", []),
+    ("v.mhd", META + "s [1] %03d.raw 1 2 1", ["s [1] 001.raw", "s [1] 002.raw"]), ("v.nhdr", NRRD + "v.raw.gz", ["v.raw.gz"]),
+    ("v.nhdr", NRRD + "s%d.raw 8 9 1", ["s8.raw", "s9.raw"]), ("v.nii", META + "other.raw", []), ("v.mhd", "none", [])])
+def test_voxels_beside_their_header_are_of_the_scene(tmp_path, volume, content, voxels):
+    scene = tmp_path / "scene.yaml"
+    scene.write_text(f"skin: {{volume: ct/{volume}, level: -300}}\n")
+    (tmp_path / "ct").mkdir()
+    (tmp_path / "ct" / volume).write_text(content)
+    for name in (*voxels, "other.raw"):
+        (tmp_path / "ct" / name).write_text("a")
+    assert repose.Scene(scene).files() == [scene, *sorted(tmp_path / "ct" / name for name in (volume, *voxels))]
+    first = hashed(scene)
+    for name in voxels:
+        (tmp_path / "ct" / name).write_text("b")
+        assert hashed(scene) != first
+        first = hashed(scene)
+
+
+def test_slices_of_a_folder_are_of_the_scene(tmp_path):
+    for folder, slice_name, line in (("one", "dcm/1", "skin: {volume: dcm, label: 1}"),
+                                     ("two", "my scan/1.dcm", "bones:\n  - volume:\n      my scan/\n"),
+                                     ("three", "1.dcm", 'skin: {"volume": "."}')):
+        scene, dicom = tmp_path / folder / "scene.yaml", tmp_path / folder / slice_name
+        dicom.parent.mkdir(parents=True)
+        dicom.write_bytes(bytes(128) + b"DICM a")
+        scene.write_text(line)
+        first = hashed(scene)
+        for other in ("page.html", "skin/other.ply"):  # a key is no folder
+            (scene.parent / other).parent.mkdir(exist_ok=True)
+            (scene.parent / other).write_text("a")
+        assert hashed(scene) == first and repose.Scene(scene).files() == [scene, dicom]
+        dicom.write_bytes(bytes(128) + b"DICM b")
+        assert hashed(scene) != first
+
+
+def test_what_stands_behind_a_number_sign_in_a_text_is_no_comment(tmp_path):
+    scene = tmp_path / "scene.yaml"
+    scene.write_text('moves: [{bone: "jaw #1", translate: [0, -2, 0]}]\n')
+    first = hashed(scene)
+    scene.write_text('moves: [{bone: "jaw #1", translate: [0, -3, 0]}]\n')
+    assert hashed(scene) != first
+
+
 # ----- the fit
 
 

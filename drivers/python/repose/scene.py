@@ -1,11 +1,53 @@
 """A scene file."""
 
+import contextlib
+import glob
 import hashlib
+import json
 import os
 import pathlib
 import re
 
 LARGEST = 1 << 20  # bytes, as of the programs
+VALUE = r"(?::\s+|^(?:[ \t]*-\s+)+)(?:[&!]\S+\s+)*"  # begin of a value in YAML, behind its anchor and tag
+# Words, texts that end in a list or map, and texts that end with their line.
+SEPARATORS = (r"[\s:,\[\]{}\"'#]+", rf"{VALUE}|[,\[\]{{}}]|\s#|\n", rf"{VALUE}|\s#|\n")
+
+
+def texts_in(yaml):
+    """The texts in YAML that may be the names of files; not all of them are values."""
+    texts = {part.strip("\"' \t\r") for separator in SEPARATORS
+             for part in re.split(separator, yaml, flags=re.M)}
+    texts |= {text.replace("''", "'") for text in re.findall(r"'((?:[^'\n]|'')*)'", yaml)}
+    for text in re.findall(r'"(?:[^"\\\n]|\\.)*"', yaml):
+        with contextlib.suppress(ValueError):  # escapes that JSON does not have
+            texts.add(json.loads(text))
+    return sorted(texts - {""})
+
+
+def voxel_files(header):
+    """The files that hold the voxels of a header of MetaImage or NRRD."""
+    if header.suffix.lower() not in (".mhd", ".mha", ".nhdr", ".nrrd"):
+        return []
+    with header.open("rb") as file:
+        text = file.read(LARGEST).decode(errors="replace")
+    key = re.search(r"^(?:ElementDataFile|data ?file)[ \t]*[=:][ \t=:]*(.*)", text, flags=re.M | re.I)
+    names = [key[1].strip()] if key else []
+    if key and names[0].startswith("LIST"):
+        names = [line.strip() for line in text[key.end():].splitlines()]
+    elif key and "%" in names[0]:  # a name of numbered files, then their numbers
+        parts = re.split(r"%\d*d", re.sub(r"(\s+-?\d+)*$", "", names[0]))
+        parts[0] = f"{header.parent}/{parts[0]}"
+        return map(pathlib.Path, glob.glob("*".join(map(glob.escape, parts))))
+    return [header.parent / name for name in names]
+
+
+def is_dicom(file):
+    """Returns whether a file has the mark of DICOM."""
+    if not os.path.isfile(file):
+        return False
+    with file.open("rb") as content:
+        return content.read(132)[128:] == b"DICM"
 
 
 class Scene:
@@ -26,15 +68,20 @@ class Scene:
         return content.decode(errors="replace")
 
     def files(self):
-        """The scene file, then the files that it names."""
-        words = set(re.findall(r"[^\s:,\[\]{}\"'#]+", self._text()))
-        named = sorted(self.path.parent / word for word in words)
-        return [self.path, *(file for file in named if os.path.isfile(file))]
+        """The scene file, then the files that it names, those that hold their voxels, and DICOM slices."""
+        text, folder = self._text(), self.path.parent
+        named = [folder / name for name in texts_in(text) if os.path.isfile(folder / name)]
+        named += [file for header in named for file in voxel_files(header)]
+        volumes = texts_in("\n".join(re.findall(r"\bvolume[\"']?\s*:\s*(.*)", text)))
+        for volume in (folder / name for name in volumes if os.path.isdir(folder / name)):
+            others_too = os.path.samefile(volume, folder)  # the scene and what is made from it
+            named += [file for file in volume.iterdir() if not others_too or is_dicom(file)]
+        return [self.path, *sorted({file for file in named if os.path.isfile(file)})]
 
     def fingerprint(self, program=None):
         """A hash of the scene without its comments, of the files that it names, and of the solver."""
-        text = self._text()
-        digest = hashlib.sha256(re.sub(r"\s+#.*|^#.*", "", text, flags=re.M).encode())
+        text = re.sub(r"""^([^"'\n]*?)(?:\s+|(?<!\S))#.*""", r"\1", self._text(), flags=re.M)
+        digest = hashlib.sha256(text.encode())
         for file in self.files()[1:]:
             digest.update(os.path.relpath(file, self.path.parent).encode() + file.read_bytes())
         if program:
