@@ -151,6 +151,10 @@ def test_derivatives_refuse_what_the_plan_does_not_have(session):
         tangent.displacement({"jaw": {"translate": [0, 1, 0]}})
     with pytest.raises(ValueError, match="'chin': turn: a motion has translate and rotate"):
         tangent.displacement({"chin": {"turn": [0, 1, 0]}})
+    for wrong in ([0, 1], [0, 1, 0, 5], 3, ["a", 0, 0], [0, float("nan"), 0], [[0], 1, 2]):
+        with pytest.raises(ValueError, match="'chin': translate must be three finite numbers, not "):
+            tangent.displacement({"chin": {"translate": wrong, "rotate": [5, 0, 0]}})
+    assert np.array_equal(tangent.displacement({}), np.zeros((2000, 3)))
 
 
 def test_a_change_of_material_or_border_is_the_scene_with_these_values(session, environment, tmp_path):

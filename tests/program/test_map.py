@@ -263,6 +263,36 @@ def test_what_stands_behind_a_number_sign_in_a_text_is_no_comment(tmp_path):
     assert hashed(scene) != first
 
 
+def test_a_damaged_sample_is_solved_again(tmp_path):
+    store = SampleStore(tmp_path, "key")
+    u, values = np.array([0.5, -1]), np.arange(60.0).reshape(20, 3)
+    whole = Sample(u, values, np.stack([values, -values]), True)
+    store.save(whole)
+    content = store.path(u).read_bytes()
+    random = np.random.default_rng(5)
+    damaged = [content[:size] for size in range(0, len(content), 97)] + [b"no archive", content[:-9] + bytes(9)]
+    for _ in range(400):
+        bytes_of = bytearray(content)
+        for place in random.integers(0, len(content), 3):
+            bytes_of[place] ^= 1 << random.integers(8)
+        damaged.append(bytes(bytes_of))
+    for one in damaged:
+        store.path(u).write_bytes(one)
+        found = store.load(u)
+        assert found is None or np.array_equal(found.displacement, values) and np.array_equal(found.slopes, whole.slopes)
+    store.path(u).write_bytes(content)
+    assert store.load(u).converged
+
+
+@pytest.mark.parametrize("motion, words", [
+    ({"translate": [0, 1]}, "'jaw': translate must be three finite numbers"), ({"turn": [1, 0, 0]}, "'jaw': turn: "),
+    ({"rotate": [0, 1, 0, 9]}, "'jaw': rotate must be three finite numbers")])
+def test_a_motion_of_a_map_has_two_vectors(motion, words):
+    box = PlanBox(["jaw"], {"translate": [1, 2, 0], "rotate": [1, 1, 0]})
+    with pytest.raises(ValueError, match=words):
+        box.vector({"jaw": motion})
+
+
 # ----- the fit
 
 

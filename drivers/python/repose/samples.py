@@ -10,7 +10,7 @@ import time
 
 import numpy as np
 
-from .session import COMPONENTS, Refused, Session
+from .session import COMPONENTS, Refused, Session, vectors_of
 
 
 class PlanBox:
@@ -36,8 +36,8 @@ class PlanBox:
         if unknown := plan.keys() - known:
             raise Refused(f"plan: '{min(unknown)}' is no piece of the plan; its pieces are "
                           f"{', '.join(sorted(known))}")
-        return np.array([plan.get(piece, {}).get(key, (0, 0, 0))[axis]
-                         for piece, key, axis in self.coordinates]) / self.half
+        motions = {piece: vectors_of(piece, plan.get(piece, {})) for piece in known}
+        return np.array([motions[piece][key][axis] for piece, key, axis in self.coordinates]) / self.half
 
     def points(self, count):
         """[count, d] the center, 4 d Sobol points, the ends of the axes, then more Sobol points. Those in the
@@ -90,7 +90,7 @@ class SampleStore:
             with np.load(self.path(u)) as stored:
                 return Sample(stored["u"], stored["displacement"].astype(float),
                               stored["slopes"].astype(float), bool(stored["converged"]))
-        except (OSError, ValueError, KeyError, EOFError):
+        except Exception:  # damaged archives and headers of arrays raise many kinds
             return None
 
     def save(self, sample):

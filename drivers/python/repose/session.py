@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import numbers
 import os
 import pathlib
 import shutil
@@ -18,6 +19,18 @@ COMPONENTS = ("tx", "ty", "tz", "rx", "ry", "rz")  # mm, then degrees
 
 class Refused(ValueError):
     """What repose-live says about a request that it does not answer."""
+
+
+def vectors_of(piece, motion):
+    """A piece's motion in a plan with both its vectors; ValueError where it is none."""
+    if unknown := motion.keys() - {"translate", "rotate"}:
+        raise ValueError(f"{piece!r}: {', '.join(sorted(unknown))}: a motion has translate and rotate")
+    vectors = {key: motion.get(key, (0, 0, 0)) for key in ("translate", "rotate")}
+    for key, vector in vectors.items():
+        if not (isinstance(vector, (list, tuple, np.ndarray)) and len(vector) == 3 and
+                all(isinstance(number, numbers.Real) and np.isfinite(number) for number in vector)):
+            raise ValueError(f"{piece!r}: {key} must be three finite numbers, not {vector}")
+    return vectors
 
 
 @dataclasses.dataclass
@@ -40,15 +53,12 @@ class Tangent:
 
     def displacement(self, change):
         """First-order displacement of the skin by a change of the plan (as a plan)."""
-        pieces, total = sorted({piece for piece, _ in self.columns}), 0
+        pieces = sorted({piece for piece, _ in self.columns})
+        total = np.zeros(next(iter(self.columns.values())).shape)
         for piece, motion in change.items():
             if piece not in pieces:
                 raise ValueError(f"{piece!r} is no piece of the plan; its pieces are {', '.join(pieces)}")
-            if unknown := motion.keys() - {"translate", "rotate"}:
-                raise ValueError(f"{piece!r}: {', '.join(sorted(unknown))}: a motion has translate and rotate")
-            values = np.concatenate([motion.get("translate", (0, 0, 0)),
-                                     motion.get("rotate", (0, 0, 0))])
-            for name, value in zip(COMPONENTS, values):
+            for name, value in zip(COMPONENTS, np.ravel(list(vectors_of(piece, motion).values()))):
                 if value and (piece, name) in self.columns:
                     total = total + value * self.columns[piece, name]
         return total
