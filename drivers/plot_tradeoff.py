@@ -10,14 +10,14 @@ true errors of all the tables together.
 Needs: apt-get install --no-install-recommends python3-matplotlib
 """
 
-import csv
-
 from sheet.script import Unusable, reading, refuse_missing, run, words
 from sheet.whole_file import Target, write_figure
 
 try:
     import matplotlib
     import numpy as np
+
+    from sheet.columns import numbers_in, read_rows
 except ImportError as missing:
     refuse_missing(missing, "apt-get install --no-install-recommends python3-matplotlib")
 
@@ -36,23 +36,25 @@ MAPPED = ("layers", "springs", "volume", "mesh")  # studies of the discrete mode
 MARKS = {"ntr": "o", "nls": "s", "lmvm": "^", "cg": "v", "bnls": "D", "bntr": "P"}
 COLORS = LinearSegmentedColormap.from_list("distance", [f"#{color}" for color in RAMP])
 INK, ACCENT = "#303030", "#b02020"
-NUMBERS = ("accuracy_mm", "cpu_s", "evaluations", "estimate_mm", "error_mm", "skin_rms_mm",
-           "skin_95_mm", "skin_max_mm")
+WORDS = ("study", "method", "volume", "load_steps", "layers", "edge_mm", "converged")
+COSTS = ("accuracy_mm", "cpu_s", "evaluations")
+DISTANCES = ("estimate_mm", "error_mm", "skin_95_mm", "skin_max_mm")
+UNKNOWN = ("nan", "-nan", "inf")
+TABLE = "a table of repose-tradeoff"
 
 
 def read(name):
-    """The rows of NAME.csv, numbers as numbers."""
-    with reading(name + ".csv", "a table of repose-tradeoff"):
-        with open(name + ".csv", newline="") as file:
-            rows = list(csv.DictReader(file))
-        for row in rows:
-            row.update({key: float(row[key]) for key in NUMBERS})
-    if not rows:
-        raise Unusable(f"{name}.csv: has no rows, and is not a table of repose-tradeoff; write it again")
-    for row in rows:
-        if row["study"] not in ("solver", *STUDIES):
-            raise Unusable(f"{name}.csv: unknown study '{row['study']}'; this script draws solver, "
-                   f"{', '.join(STUDIES)}")
+    """The rows of NAME.csv, numbers as numbers; those of runs that did not end may be unknown."""
+    rows = read_rows(name + ".csv", TABLE, (*WORDS, *COSTS, *DISTANCES))
+    with reading(name + ".csv", TABLE):
+        if unknown := [row["study"] for row in rows if row["study"] not in ("solver", *STUDIES)]:
+            raise Unusable(f"{name}.csv: unknown study '{unknown[0]}'; this script draws solver, "
+                           f"{', '.join(STUDIES)}")
+        numbers_in(rows, "converged", 0, 1, int)
+        for key in (*COSTS, *DISTANCES):
+            unknown = UNKNOWN if key in DISTANCES else ()
+            for row, number in zip(rows, numbers_in(rows, key, 0, unknown=unknown)):
+                row[key] = number
     return rows
 
 
@@ -73,7 +75,7 @@ def draw_methods(axes, rows, cost, label):
     axes.set_ylabel("true error, mm")
     if not rows:
         return
-    unit = min(row["cpu_s"] for row in rows) if cost == "cpu_s" else 1
+    unit = min(row["cpu_s"] for row in rows) or 1 if cost == "cpu_s" else 1
     for method in dict.fromkeys(row["method"] for row in rows):
         own = sorted((row for row in rows if row["method"] == method),
                      key=lambda row: -row["accuracy_mm"])
@@ -94,7 +96,7 @@ def draw_choices(axes, rows):
     axes.barh(place, [max(row["skin_max_mm"], 1e-6) for row in rows], color="0.85", label="largest")
     axes.barh(place, [max(row["skin_95_mm"], 1e-6) for row in rows], color="0.6", height=0.5,
               label="95 %")
-    unit = min(row["cpu_s"] for row in rows)
+    unit = min(row["cpu_s"] for row in rows) or 1
     for k, row in enumerate(rows):
         axes.text(0.98, k, f"{row['cpu_s'] / unit:.2g}×", fontsize=6.5, ha="right", va="center",
                   transform=axes.get_yaxis_transform())
@@ -120,16 +122,19 @@ def draw_study(name, rows):
 
 def draw_map(name):
     """The reference's face from the side and the front, colored by each way's error."""
-    with reading(name + "_map.csv", "a map of repose-tradeoff"):
-        with open(name + "_map.csv", newline="") as file:
-            titles = next(csv.reader(file))[3:]
-        values = np.atleast_2d(np.genfromtxt(name + "_map.csv", delimiter=",", skip_header=1))
-    with reading(name + "_triangles.csv", "triangles of repose-tradeoff"):
-        triangles = np.genfromtxt(name + "_triangles.csv", delimiter=",", skip_header=1, dtype=int)
+    file, what = name + "_map.csv", "a map of repose-tradeoff"
+    rows = read_rows(file, what, "xyz")
+    titles = [title for title in rows[0] if title not in ("x", "y", "z")]
+    with reading(file, what):
+        points = np.stack([numbers_in(rows, axis) for axis in "xyz"], axis=1)
+        error = np.array([numbers_in(rows, title, 0) for title in titles]).T
+    file, what = name + "_triangles.csv", "triangles of repose-tradeoff"
+    rows = read_rows(file, what, "abc")
+    with reading(file, what):
+        triangles = np.stack([numbers_in(rows, corner, 0, len(points) - 1, int) for corner in "abc"], axis=1)
     shown = [k for k, title in enumerate(titles) if title.startswith(MAPPED)]
     if not shown:
         return
-    points, error = values[:, :3], values[:, 3:]
     largest = np.percentile(error[:, shown].max(axis=1), 99)
     figure, panels = plt.subplots(1, len(shown), figsize=(1.7 * len(shown), 2.6), squeeze=False)
     order = np.argsort(-points[triangles][:, :, 1].mean(axis=1))

@@ -248,7 +248,7 @@ def test_the_histogram_is_drawn(run, tmp_path):
     (tmp_path / "one.csv").write_text(header + "-1,1,1\n")
     assert subprocess.run([*script, "one"], cwd=tmp_path).returncode == 0
     for name, text, part in (("e", None, "e.csv"), ("header", header, "has no rows"), ("empty", "", "has no rows"),
-                             ("words", header + "a,1,1\n", "low_mm holds values that are no finite numbers")):
+                             ("words", header + "a,1,1\n", "row 1 of column low_mm holds 'a', no finite number")):
         text is None or (tmp_path / f"{name}.csv").write_text(text)
         bad = subprocess.run([*script, name], cwd=tmp_path, text=True, capture_output=True)
         assert bad.returncode == 1 and len(bad.stderr.splitlines()) == 1 and part in bad.stderr, bad

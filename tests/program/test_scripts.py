@@ -111,6 +111,42 @@ def test_a_table_without_rows_is_refused(script, tmp_path):
     says(script("plot_paper.py", "."), "plot_paper.py", "laws.csv: has no rows")
 
 
+TRADEOFF = {
+    "study.csv": ("study,method,accuracy_mm,volume,load_steps,layers,edge_mm,converged,cpu_s,evaluations,estimate_mm,"
+                  "error_mm,skin_rms_mm,skin_95_mm,skin_max_mm,reason\n" +
+                  'layers,ntr,0.1,none,auto,4,0,1,0.2,9,0.01,0.002,nan,0.3,0.4,"a, b"\n' * 2),
+    "study_map.csv": 'x,y,z,"layers: 4"\n0,0,0,0.1\n1,0,0,0.2\n0,0,1,0.3\n',
+    "study_triangles.csv": "a,b,c\n0,1,2\n"}
+
+
+@pytest.mark.parametrize("file, old, new, part", [
+    ("study.csv", "", "", None), ("study.csv", "study,", "way,", "it has no column study"),
+    ("study.csv", "method", "x", "no column method"), ("study.csv", "converged", "x", "no column converged"),
+    ("study.csv", "layers,edge", "x,edge", "no column layers"), ("study.csv", ',"a, b"', "", "row 1 does not have 16 values"),
+    ("study.csv", "0.2,9,", "x,9,", "row 1 of column cpu_s holds 'x', no finite number from 0"),
+    ("study.csv", "0.2,9,", "0,9,", None), ("study.csv", "4,0,1,", "4,0,yes,", "no whole number from 0 to 1"),
+    ("study.csv", "0.002", "-1", "'-1', no finite number from 0"), ("study.csv", "0.002", "nan", None),
+    ("study.csv", '"a, b"', '"' + "a" * 200_000 + '"', "line 2: field larger"),
+    ("study_map.csv", "\n0,0,0,0.1\n1,0,0,0.2\n0,0,1,0.3", "", "has no rows"),
+    ("study_map.csv", "x,y", "x,w", "it has no column y"), ("study_map.csv", "1,0,0,0.2", "1,0,0", "row 2 does not have 4"),
+    ("study_map.csv", "0.3", "x", "row 3 of column layers: 4 holds 'x', no finite number from 0"),
+    ("study_map.csv", "0,0,1,", "0,0,nan,", "row 3 of column z holds 'nan', no finite number"),
+    ("study_triangles.csv", "0,1,2\n", "", "has no rows"), ("study_triangles.csv", "2", "x", "row 1 of column c holds 'x'"),
+    ("study_triangles.csv", "2", "3", "row 1 of column c holds '3', no whole number from 0 to 2"),
+    ("study_triangles.csv", "2", "-1", "no whole number from 0 to 2"), ("study_triangles.csv", "2", "1.5", "no whole number"),
+    ("study_triangles.csv", "0,1,2\n", "0\n", "row 1 does not have 3 values")])
+def test_a_damaged_table_of_a_study_is_refused(script, tmp_path, file, old, new, part):
+    pytest.importorskip("matplotlib")
+    for name, text in TRADEOFF.items():
+        (tmp_path / name).write_text(text.replace(old, new, 1) if name == file else text)
+    done = script("plot_tradeoff.py", "study")
+    if part:
+        says(done, "plot_tradeoff.py", f"{file}: ", part)
+    else:
+        assert (done.returncode, done.stderr) == (0, ""), done
+        assert (tmp_path / "study_map.png").exists()
+
+
 # ----- arguments
 
 OWN = sorted(SCRIPTS.keys() - {"paraview_repose.py", "plan.py", "Repose"})
