@@ -399,6 +399,21 @@ def test_the_panel_does_not_replace_a_model_that_it_reads(panel, head, tmp_path)
         assert len(result.stderr.splitlines()) == 1 and arguments[1].read_bytes() == content
 
 
+def test_two_outputs_of_one_file_are_refused(panel, head, tmp_path):
+    (tmp_path / "folder").mkdir()
+    for first, second in (("--predictedSkin", "--movedBone2"), ("--movedBone1", "--returnparameterfile")):
+        result = panel(*head(), first, tmp_path / "a.vtp", second, tmp_path / "folder/../a.vtp")
+        assert result.returncode == 1 and len(result.stderr.splitlines()) == 1, result
+        assert f"{second} {tmp_path}/folder/../a.vtp: is the file of {first}, too; choose another one" in result.stderr
+        assert not (tmp_path / "a.vtp").exists()
+
+
+def test_a_moved_model_of_no_bone_is_refused(panel, head, tmp_path):
+    result = panel(*head(), "--movedBone4", tmp_path / "bone4.vtp")
+    assert (result.returncode, result.stderr) == (
+        1, "Repose: bone 4 has a moved model to write and no model; choose one\n")
+
+
 def test_a_preview_says_that_it_is_one(panel, head, tmp_path):
     result = panel(*head(), "--preview", "--accuracy", 0.1, "--predictedSkin",
                    tmp_path / "skin.vtp", "--returnparameterfile", tmp_path / "numbers")
@@ -407,6 +422,9 @@ def test_a_preview_says_that_it_is_one(panel, head, tmp_path):
     assert re.match(r"PREVIEW, to 1 mm: the face is within \S+ mm of rest", numbers["verdict"])
     assert "accuracy reached" not in numbers["verdict"]
     assert float(numbers["accuracyReached"]) <= 1
+    assert numbers["meshError"] == "-1", "no coarse model of a skin of less than 4000 vertices"
+    report = read_vtp(tmp_path / "skin.vtp")["uncertainty"]
+    assert np.ptp(report) == 0 and report[0, 0] == pytest.approx(float(numbers["accuracyReached"]), rel=1e-5)
 
 
 @pytest.fixture(scope="module")

@@ -103,8 +103,13 @@ def targets_of(chosen):
     outputs = [name for name, item in known.items() if item.findtext("channel") == "output"]
     inputs = [chosen[name] for name, item in known.items()
               if "fileExtensions" in item.attrib and name not in outputs]
-    return {name: Target(chosen[name], "", inputs) for name in [*outputs, "returnparameterfile"]
-            if chosen[name]}
+    targets = {name: Target(chosen[name], "", inputs) for name in [*outputs, "returnparameterfile"]
+               if chosen[name]}
+    first = {}  # the first output of each file
+    for name in targets:
+        if (other := first.setdefault(os.path.realpath(chosen[name]), name)) != name:
+            raise Refusal(f"--{name} {chosen[name]}: is the file of --{other}, too; choose another one")
+    return targets
 
 
 # ----- the scene
@@ -156,8 +161,9 @@ def bone_entries(chosen, folder):
     for i in range(1, BONES + 1):
         model, transform = chosen[f"bone{i}"], chosen[f"transform{i}"]
         if model is None:
-            if transform:
-                raise Refusal(f"bone {i} has a transform and no model; choose one")
+            for name, given in (("transform", transform), ("moved model to write", chosen[f"movedBone{i}"])):
+                if given:
+                    raise Refusal(f"bone {i} has a {name} and no model; choose one")
             continue
         names = chosen["boneNames"]
         name = names[i - 1] if i <= len(names) else f"bone {i}"
