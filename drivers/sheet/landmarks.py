@@ -188,16 +188,26 @@ def head_axes(landmarks):
     return turn @ axes, "the head by its condyles, nasion and upper incisors"
 
 
+class NearestPlace:
+    """The nearest places of a surface before, where they are after, and their distances."""
+
+    def __init__(self, before, after, corners):
+        self.before, self.after, self.corners = before, after, corners
+        self.middles = before[corners].mean(1)
+        self.reach = np.linalg.norm(before[corners] - self.middles[:, None], axis=2).max(1)
+
+    def of(self, point):
+        away = np.linalg.norm(self.middles - point, axis=1)
+        faces = self.corners[away - self.reach <= away.min()]
+        weights = nearest_weights(self.before[faces], point)
+        places = np.einsum("fk,fkx->fx", weights, self.before[faces])
+        best = np.argmin(((places - point)**2).sum(1))
+        return places[best], weights[best] @ self.after[faces[best]], np.linalg.norm(places[best] - point)
+
+
 def on_surface(before, after, corners, point):
     """The nearest place of a surface before, where it is after, and the distance."""
-    middles = before[corners].mean(1)
-    reach = np.linalg.norm(before[corners] - middles[:, None], axis=2).max(1)
-    away = np.linalg.norm(middles - point, axis=1)
-    faces = corners[away - reach <= away.min()]
-    weights = nearest_weights(before[faces], point)
-    places = np.einsum("fk,fkx->fx", weights, before[faces])
-    best = np.argmin(((places - point)**2).sum(1))
-    return places[best], weights[best] @ after[faces[best]], np.linalg.norm(places[best] - point)
+    return NearestPlace(before, after, corners).of(point)
 
 
 def nearest_weights(triangles, point):
@@ -228,21 +238,22 @@ def nearest_weights(triangles, point):
 def place_landmarks(result, landmarks):
     """[{name, on, before, after}] of those on the skin, on a bone (with which they go) or on the
     given skin beyond the one that was solved; and {name: distance in mm} of the others."""
+    solved, given = (skin and NearestPlace(skin.before, skin.after, skin.corners)
+                     for skin in (result.solved, result.given))
+    bones = [(bone, NearestPlace(bone["before"], bone["before"], bone["corners"])) for bone in result.bones]
     placed, lost = [], {}
     for name, point in landmarks.items():
-        skin = result.solved
-        before, after, distance = on_surface(skin.before, skin.after, skin.corners, point)
+        before, after, distance = solved.of(point)
         best = {"name": name, "on": "skin", "before": before, "after": after}
-        for bone in result.bones:
-            away = on_surface(bone["before"], bone["before"], bone["corners"], point)[2]
+        for bone, surface in bones:
+            away = surface.of(point)[2]
             if away < distance:
                 turn, shift = bone["motion"]
                 distance = away
                 best = {"name": name, "on": bone["name"], "before": point,
                         "after": turn @ point + shift}
-        if distance > NEAR and result.given:
-            given = result.given
-            before, after, distance = on_surface(given.before, given.after, given.corners, point)
+        if distance > NEAR and given:
+            before, after, distance = given.of(point)
             best = {"name": name, "on": BEYOND, "before": before, "after": after}
         if distance <= NEAR:
             placed.append(best)

@@ -69,16 +69,21 @@ double middle_of_chin(const FrontMap& map, double low) {
   return std::abs(aside) > near ? aside : 0;
 }
 
-/// Point B, on the profile at x = `aside`, after pogonion and the lower incisors.
-void search_b_point(const std::vector<ProfilePoint>& profile, double aside, Search& search) {
-  const auto menton = search.profile_point("menton_bone"),
-             pogonion = search.profile_point("pogonion_bone"),
-             edge = search.profile_point("lower_incisor_edge");
-  const double height = edge->y() - menton->y();
-  const double lowest = std::max(pogonion->y() + 0.1 * height, menton->y() + 0.35 * height);
+/// Pogonion and point B, on the profile at x = `aside`, after menton and the lower incisors.
+void search_chin(const std::vector<ProfilePoint>& profile, double aside, Search& search) {
+  const ProfilePoint edge = *search.profile_point("lower_incisor_edge");
+  const double menton = search.find("menton_bone")->z(), height = edge.y() - menton;
+  if (height < scene::lower_jaw_with_teeth)
+    search.remark(fmt::format(
+        "MANDIBLE is {:.0f} mm high at the chin, {:.0f} mm or more with teeth: it may be "
+        "edentulous, and lower_incisor_edge the crest of the bone",
+        height, scene::lower_jaw_with_teeth));
+  search.put("pogonion_bone", chin_of(profile, menton, menton + 0.45 * height), "no chin", aside);
+  const ProfilePoint pogonion = *search.profile_point("pogonion_bone");
+  const double lowest = std::max(pogonion.y() + 0.1 * height, menton + 0.35 * height);
   search.put(
       "b_point",
-      farthest_from_chord(between(profile, lowest, edge->y() - 0.2 * height), *pogonion, *edge, -1),
+      farthest_from_chord(between(profile, lowest, edge.y() - 0.2 * height), pogonion, edge, -1),
       "no bone between pogonion and the lower incisors", aside);
 }
 
@@ -92,12 +97,12 @@ void search_symphysis(const FrontMap& map, const ScanEnd& end, Search& search) {
   if (profile.empty()) return lacks("MANDIBLE has no bone at the midline");
   const double front = foremost_of(profile)->x(), aside = middle_of_chin(map, profile.front().y());
   if (aside != 0) {
-    search.remark(
-        fmt::format("the chin lies {:.0f} mm {} of the skull's midsagittal plane; its landmarks of "
-                    "bone and skin "
-                    "are put there: check them",
-                    std::abs(aside), aside > 0 ? "left" : "right"));
+    search.remark(fmt::format(
+        "the chin lies {:.0f} mm {} of the skull's midsagittal plane; its landmarks of bone and "
+        "skin are put there: check them",
+        std::abs(aside), aside > 0 ? "left" : "right"));
     profile = map.profile(map.low_z(), map.high_z(), midline, aside);
+    if (profile.empty()) return lacks("MANDIBLE has no bone in the middle of its chin");
   }
   const ProfilePoint lowest = profile.front();
   if (end.within(search.frame().to_scan({aside, lowest.x(), lowest.y()}), cut))
@@ -106,16 +111,9 @@ void search_symphysis(const FrontMap& map, const ScanEnd& end, Search& search) {
   const double menton = search.find("menton_bone")->z();
   if (const auto edge = tooth_edge(map, 1, {front + 6, menton + 5}, map.high_z(), 12))
     search.put("lower_incisor_edge", *edge);
-  const auto edge = search.profile_point("lower_incisor_edge");
-  if (!edge) return search.lack("lower_incisor_edge", "no bone above the chin at the midline");
-  const double height = edge->y() - menton;
-  if (height < scene::lower_jaw_with_teeth)
-    search.remark(fmt::format(
-        "MANDIBLE is {:.0f} mm high at the chin, {:.0f} mm or more with teeth: it may be "
-        "edentulous, and lower_incisor_edge the crest of the bone",
-        height, scene::lower_jaw_with_teeth));
-  search.put("pogonion_bone", chin_of(profile, menton, menton + 0.45 * height), "no chin", aside);
-  search_b_point(profile, aside, search);
+  if (!search.find("lower_incisor_edge"))
+    return search.lack("lower_incisor_edge", "no bone above the chin at the midline");
+  search_chin(profile, aside, search);
 }
 
 /// Returns whether the mandible ends at a condyle's top because its scan did.
