@@ -422,8 +422,8 @@ def view(plans):
 <button data-mode="split">split</button><button data-mode="side">side by side</button>
 <button data-mode="single">one</button></span>{pair}
 <select id="coloring" aria-label="coloring of the skin"><option value="">skin</option></select>
-<label id="share-label" hidden>{html.escape(names[0])} <input type="range" id="share" min="0" max="1"
-step="0.02" value="1"> {html.escape(names[-1])}</label>
+<label id="share-label" hidden><span id="share-from"></span> <input type="range" id="share" min="0" max="1"
+step="0.02" value="1"> <span id="share-to"></span></label>
 <label>skin <input type="range" id="skin" min="0" max="1" step="0.05" value="1"></label>
 <label><input type="checkbox" id="bones" checked> bones</label>
 <label><input type="checkbox" id="measure"> measure</label><output id="distance"></output></div>

@@ -104,6 +104,8 @@ class Sheet {
   showStates() {
     const [one, other] = this.pair(), names = this.described.states;
     const share = Number(bySheetId("share").value);
+    bySheetId("share-from").textContent = names[one];
+    bySheetId("share-to").textContent = names[other];
     const single = share === 0 ? one : share === 1 ? other : FaceViewer.MIXED;
     this.viewer.show({mode: this.mode, states: this.mode === "single" ? [single] : [one, other]});
     bySheetId("tag-left").textContent = this.mode !== "single" ? names[one]
@@ -131,7 +133,8 @@ class Sheet {
   }
 
   sentence({surface, state, at}) {
-    const names = this.described.states, after = state === 0 || state === FaceViewer.MIXED ? 1 : state;
+    const names = this.described.states, between = state === 0 || state === FaceViewer.MIXED;
+    const after = between ? this.pair()[1] : state;
     if (!surface.positions[0] || !surface.positions[after]) return surface.name;
     const [from, to] = [0, after].map(k => at(surface.positions[k], 3));
     const shift = to.map((value, axis) => value - from[axis]);

@@ -85,6 +85,14 @@ class FaceSurface {
     geometry.boundingSphere = null;
   }
 
+  clear(state) {
+    if (!this.meshes[state]) return;
+    this.viewer.three.scene.remove(this.meshes[state]);
+    this.meshes[state].geometry.dispose();
+    delete this.meshes[state];
+    delete this.positions[state];
+  }
+
   makeMesh(state, positions) {
     const geometry = new THREE.BufferGeometry();
     geometry.setIndex(this.index);
@@ -266,7 +274,10 @@ class FaceViewer {
   mix(one, other, share) {
     for (const surface of this.surfaces) {
       const [a, b] = [surface.positions[one], surface.positions[other]];
-      if (!a || !b) continue;
+      if (!a || !b) {
+        surface.clear(FaceViewer.MIXED);
+        continue;
+      }
       surface.setPositions(FaceViewer.MIXED, a.map((from, i) => from + share * (b[i] - from)));
       const [f, g] = [surface.fields[one], surface.fields[other]];
       surface.setField(FaceViewer.MIXED, g

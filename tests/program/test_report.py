@@ -535,6 +535,41 @@ def test_two_plans_are_compared(report, opened, other_plan, tmp_path):
     assert len(page.rows["lower face"]) == 6
 
 
+def test_the_slider_and_the_pointer_name_the_states_of_the_pair(report, opened, other_plan, tmp_path):
+    needs_browser()
+    page_of(report, tmp_path, opened, other_plan, "-landmarks", MARKS)
+    found = evaluate(tmp_path / "page.html", """
+      const text = id => document.getElementById(id).textContent, weights = values => [...values.slice(0, 3)];
+      const set = (id, value, kind) => {
+        const element = document.getElementById(id);
+        element.value = value;
+        element.dispatchEvent(new Event(kind));
+      };
+      const found = {};
+      sheet.setMode("single");
+      for (const pair of ["1 2", "0 1", "0 2"]) {
+        set("pair", pair, "change");
+        found[pair] = [0, 0.02, 0.5, 0.98, 1].map(share => {
+          set("share", share, "input");
+          return sheet.sentence({surface: sheet.skin, state: sheet.viewer.shown.states[0], at: weights})
+            .split(":")[0];
+        });
+        found[pair].push(text("share-label").trim().split(/\\s{2,}/));
+      }
+      const jaw = sheet.viewer.surfaces.find(one => one.name === "mandible" && one.positions[1]);
+      set("share", 0.5, "input");
+      set("pair", "0 1", "change");
+      found.jaw = Boolean(jaw.object(FaceViewer.MIXED));
+      set("pair", "0 2", "change");
+      found.left = Boolean(jaw.object(FaceViewer.MIXED));
+      return found;
+    """)
+    assert found["1 2"] == ["0", *["half"] * 4, ["0", "half"]]
+    assert found["0 1"] == [*["0"] * 5, ["before", "0"]]
+    assert found["0 2"] == [*["half"] * 5, ["before", "half"]]
+    assert found["jaw"] and not found["left"], "a bone of one plan is not drawn with the other"
+
+
 def test_another_patient_is_refused(report, opened, other_plan):
     with h5py.File(other_plan, "r+") as h5:
         h5["model/point/position"][...] += 20
