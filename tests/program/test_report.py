@@ -570,6 +570,18 @@ def test_the_slider_and_the_pointer_name_the_states_of_the_pair(report, opened, 
     assert found["jaw"] and not found["left"], "a bone of one plan is not drawn with the other"
 
 
+def test_a_table_that_is_wider_than_a_phone_shows_that_it_scrolls(report, opened, other_plan, tmp_path):
+    needs_browser()
+    page_of(report, tmp_path, opened, other_plan, "-landmarks", MARKS)
+    found = evaluate(tmp_path / "page.html", """
+      document.documentElement.style.width = "390px";
+      return [...document.querySelectorAll("section .wide")].map(box => [box.querySelector("th").textContent,
+        box.scrollWidth > box.clientWidth, getComputedStyle(box).backgroundAttachment]);
+    """)
+    assert [head for head, wider, _ in found if wider] == ["plan"], found
+    assert all(attachment == "local, local, scroll, scroll" for _, _, attachment in found), found
+
+
 def test_another_patient_is_refused(report, opened, other_plan):
     with h5py.File(other_plan, "r+") as h5:
         h5["model/point/position"][...] += 20
