@@ -1,5 +1,6 @@
 // The page of drivers/live.py: bones are dragged, the face follows. At once by the derivatives of
 // the latest plan solved with them ("preview"), and exactly as soon as the solver has answered.
+// Where no derivatives are known, the face of the former plan stays and is marked as such.
 "use strict";
 
 const byId = id => document.getElementById(id);
@@ -7,6 +8,9 @@ const TOKEN = new URLSearchParams(location.search).get("token");
 const COMPONENTS = ["tx", "ty", "tz", "rx", "ry", "rz"];
 const BEFORE = 0, NOW = 1, KEPT = 2;
 const NOTICE_TIME = 5000;  // ms
+const ROUNDING = 1e-9;     // mm or degrees
+const isSame = (one, other) => JSON.stringify(one) === JSON.stringify(other);
+
 async function ask(path, request) {
   const response = await fetch(path, request === undefined
     ? {headers: {"X-Token": TOKEN}}
@@ -39,7 +43,7 @@ class Planner {
     this.past = [];
     this.future = [];
     this.reference = null;  // {plan, position, columns}: the latest solved with tangents
-    this.exact = null;      // {plan, position, error}: the latest solved
+    this.exact = null;      // {plan, position}: the latest solved
     this.asked = 0;
     this.solved = arrays.position;  // initial positions of the skin that is solved
     // It has no cuts: lips that part are shown on the skin that is solved.
@@ -75,9 +79,14 @@ class Planner {
     scene.add(this.handle);
     this.gizmo = new THREE.TransformControls(camera, renderer.domElement);
     this.gizmo.setSize(0.9);
-    scene.add(this.gizmo.getHelper());
+    const helper = this.gizmo.getHelper();
+    scene.add(helper);
     this.gizmo.attach(this.handle);
     this.gizmo.addEventListener("change", () => this.viewer.draw());
+    this.viewer.onPane = ({state, left, width}, height) => {  // side by side: beside "now" alone
+      helper.visible = state === NOW || this.viewer.shown.mode !== "side";
+      if (helper.visible) this.gizmo.viewport = {x: left, y: 0, z: width, w: height};
+    };
     this.gizmo.addEventListener("dragging-changed", event => {
       controls.enabled = !event.value;
       if (event.value) this.begin = copyOf(this.plan);
@@ -197,7 +206,7 @@ class Planner {
   }
 
   remember(before) {
-    if (JSON.stringify(before) === JSON.stringify(this.plan)) return;
+    if (isSame(before, this.plan)) return;
     this.past.push(before);
     this.future = [];
     this.showHistory();
@@ -224,6 +233,8 @@ class Planner {
     this.placeHandle();
     this.showNumbers();
     this.moveBones();
+    byId("under").textContent = "";
+    byId("angles").style.visibility = "hidden";
     this.preview();
     this.solveSoon();
   }
@@ -242,21 +253,46 @@ class Planner {
   }
 
   preview() {
-    const began = performance.now(), {reference} = this;
-    const base = reference ?? this.exact;
-    if (!base) return this.mark("", "solving the scene's plan …");
-    const position = base.position.slice();
-    if (reference)
-      for (const {piece, key, axis, values} of reference.columns) {
-        const by = this.plan[piece][key][axis] - reference.plan[piece][key][axis];
-        if (by) for (let i = 0; i < position.length; ++i) position[i] += by * values[i];
+    const position = this.firstOrder();
+    if (position) {
+      this.showFace(position);
+      this.mark("preview", "preview");
+    } else {
+      this.setFormer(true);
+      this.mark("former", `face ${this.position ? "of the former plan" : "before any move"}, solving …`);
+    }
+  }
+
+  // Positions to first order, or null where a derivative that they need is not known.
+  firstOrder() {
+    const {exact, reference} = this;
+    if (isSame(exact?.plan, this.plan)) return exact.position;
+    const position = reference?.position.slice();
+    for (const name of reference ? this.pieces.keys() : [])
+      for (const [index, component] of COMPONENTS.entries()) {
+        const key = index < 3 ? "translate" : "rotate", axis = index % 3;
+        const by = this.plan[name][key][axis] - reference.plan[name][key][axis];
+        if (Math.abs(by) < ROUNDING) continue;
+        const values = reference.columns.get(`${name} ${component}`);
+        if (!values) return null;
+        for (let i = 0; i < position.length; ++i) position[i] += by * values[i];
       }
-    this.showFace(position);
-    this.previewed = performance.now() - began;
-    this.mark("preview", "preview");
+    return position ?? null;
+  }
+
+  // Sets whether the face that is shown is not of this plan. It is then not kept or saved as if it were.
+  setFormer(former) {
+    const other = former && this.position;
+    this.former = former;
+    byId("which").textContent = other ? "former plan" : "now";
+    byId("unit").textContent = `${other ? "former plan" : "movement"}, mm`;
+    if (former) byId("measured").textContent = "";
+    for (const id of ["keep", "save_stl"]) byId(id).disabled = former;
+    byId("mode").querySelector("[value=plans]").disabled = former && !this.kept;
   }
 
   showFace(position) {
+    this.setFormer(false);
     this.position = this.follow(position);
     this.skin.setPositions(NOW, this.position);
     this.color();
@@ -288,16 +324,16 @@ class Planner {
 
   async solve(tangents) {
     const number = ++this.asked, plan = copyOf(this.plan);
-    const current = () => number === this.asked &&
-      JSON.stringify(plan) === JSON.stringify(this.plan);
+    const current = () => number === this.asked && isSame(plan, this.plan);
     try {
       const answer = await ask("/solve", {plan, tangents});
       if (!answer.byteLength) return;  // overtaken
       const {head, arrays} = unpack(answer);
-      this.exact = {plan, position: arrays.position, error: head.error};
+      if (head.converged) this.exact = {plan, position: arrays.position};
       if (tangents) this.takeTangents(plan, head, arrays);
       if (!current()) return;
       this.showFace(arrays.position);
+      byId("angles").style.visibility = "visible";
       byId("angles").textContent = (head.angles ?? []).map(({name, before, after}) =>
         `${name} ${after.toFixed(1)}° (before ${before.toFixed(1)}°)`).join("; ");
       if (!head.converged) this.mark("failed", `not converged: ${head.reason}`);
@@ -309,13 +345,11 @@ class Planner {
   }
 
   takeTangents(plan, {flags}, arrays) {
-    const columns = [];
+    const columns = new Map();
     for (const [name, values] of Object.entries(arrays)) {
       const [, bone, component] = name.match(/^tangent_(\d+)_(..)$/) ?? [];
-      if (!component || !Object.values(flags[name]).every(Boolean)) continue;
-      const index = COMPONENTS.indexOf(component);
-      columns.push({piece: this.head.bones[Number(bone)], values, axis: index % 3,
-                    key: index < 3 ? "translate" : "rotate"});
+      if (component && Object.values(flags[name]).every(Boolean))
+        columns.set(`${this.head.bones[Number(bone)]} ${component}`, values);
     }
     this.reference = {plan, position: arrays.position, columns};
   }
@@ -325,12 +359,14 @@ class Planner {
   color() {
     if (!this.position) return;
     const colored = byId("colored").checked, now = this.movement(this.position);
-    const high = Math.max(1, Math.ceil(now.reduce((most, v) => Math.max(most, v), 0)));
+    const kept = this.kept && this.movement(this.kept);
+    const farthest = (values, least) => values.reduce((most, v) => Math.max(most, v), least);
+    const high = Math.ceil(farthest(kept ?? [], farthest(now, 1)));
     byId("high").textContent = String(high);
     byId("bar").hidden = !colored;
     this.viewer.setScale({low: 0, high});
     this.skin.setField(NOW, colored ? now : null);
-    if (this.kept) this.skin.setField(KEPT, colored ? this.movement(this.kept) : null);
+    if (kept) this.skin.setField(KEPT, colored ? kept : null);
     drawRamp(byId("ramp"), this.viewer.scale.ramp);
     this.viewer.draw();
   }
@@ -344,7 +380,8 @@ class Planner {
     const position = hit.state === KEPT ? this.kept : hit.state === NOW ? this.position
       : this.initial;
     const shift = hit.at(position, 3).map((x, a) => x - hit.at(this.initial, 3)[a]);
-    return shiftInWords(alongHead(this.head.axes, shift));
+    return (hit.state === NOW && this.former ? "former plan: " : "") +
+      shiftInWords(alongHead(this.head.axes, shift));
   }
 
   drawProfile() {
@@ -356,7 +393,6 @@ class Planner {
   }
 
   keep() {
-    if (!this.position) return;
     this.kept = this.position.slice();
     this.skin.setPositions(KEPT, this.kept);
     this.bones.forEach(bone => {
@@ -371,6 +407,7 @@ class Planner {
   }
 
   showMode() {
+    if (byId("mode").selectedOptions[0].disabled) byId("mode").value = "after";
     const mode = byId("mode").value;
     if (mode === "plans" && !this.kept) return this.keep();
     this.viewer.show(mode === "after" ? {mode: "single", states: [NOW, NOW]}

@@ -26,6 +26,7 @@
 //   draw()                       after changes made through `three` ({scene, camera, renderer,
 //                                controls, THREE}), where a gizmo may be added
 //   onHover, onClick, onLook     callbacks: (hit, event), (hit, event), ()
+//   onPane                       callback before each pane is drawn: ({state, left, width}, height)
 // Of a surface:
 //   setPositions(state, positions)     new positions, for live updates; setField(state, values or
 //   null, gray) colors it, NaN and where gray is true gray; setStyle({color, opacity, visible, plain, image}); object(state) is
@@ -346,6 +347,7 @@ class FaceViewer {
       renderer.setScissor(pane.from, 0, pane.to - pane.from, height);
       for (const surface of this.surfaces) surface.drawIn(pane.state);
       this.drawMarks(pane.state);
+      this.onPane?.(pane, height);
       renderer.render(scene, camera);
     }
     renderer.setScissorTest(false);

@@ -19,10 +19,20 @@ sys.path.insert(0, str(PROJECT / "drivers/python"))
 import repose  # noqa: E402
 
 SCENE = PROJECT / "meshes/head_live.yaml"
-SCRIPT = """
+HELPERS = """
 const sleep = time => new Promise(end => setTimeout(end, time));
 const mark = () => document.getElementById("mark");
 const exact = async () => { while (mark().className !== "exact") await sleep(30); };
+"""
+TOLD = """
+.catch(reason => ({error: String(reason.stack)})).then(found => {
+  const told = document.createElement("pre");
+  told.id = "found";
+  told.textContent = JSON.stringify(found);
+  document.body.append(told);
+});
+"""
+SCRIPT = """
 (async () => {
   const found = {};
   while (!window.planner || !planner.reference) await sleep(30);
@@ -69,13 +79,83 @@ const exact = async () => { while (mark().className !== "exact") await sleep(30)
   found.loaded = performance.getEntriesByType("resource").map(one => new URL(one.name).host)
     .filter(host => host !== location.host);
   return found;
-})().catch(reason => ({error: String(reason.stack)})).then(found => {
-  const told = document.createElement("pre");
-  told.id = "found";
-  told.textContent = JSON.stringify(found);
-  document.body.append(told);
-});
-"""
+})()"""
+# The solver answers without derivatives while `without` is true.
+FORMER = """
+let without = true;
+const answered = unpack;
+unpack = buffer => {
+  const answer = answered(buffer);
+  if (without) answer.arrays = Object.fromEntries(
+    Object.entries(answer.arrays).filter(([name]) => !name.startsWith("tangent_")));
+  return answer;
+};
+(async () => {
+  const text = id => document.getElementById(id)?.textContent, found = {};
+  const seen = () => ({mark: mark().textContent, kind: mark().className, measured: text("measured"),
+    which: text("which"), unit: text("unit"), angles: getComputedStyle(document.getElementById("angles")).visibility,
+    off: ["keep", "save_stl"].map(id => document.getElementById(id).disabled),
+    under: planner.describe({state: 1, at: () => [0, 0, 0]})});
+  const type = value => {
+    planner.inputs[0].value = value;
+    planner.inputs[0].dispatchEvent(new Event("change"));
+  };
+  while (!window.planner) await sleep(1);
+  await exact();
+  found.first = seen();
+  const face = planner.position;
+  type(-6);
+  found.typed = seen();
+  found.stays = planner.position === face;
+  document.getElementById("undo").click();
+  found.undone = seen();
+  type(-6);
+  await exact();
+  found.then = seen();
+  without = false;
+  await planner.solve(true);
+  type(-5);
+  found.preview = seen();
+  planner.reference.columns.delete("chin ty");
+  type(-4);
+  found.missing = seen();
+  return found;
+})()"""
+VIEWS = """
+(async () => {
+  const found = {}, show = mode => {
+    document.getElementById("mode").value = mode;
+    document.getElementById("mode").onchange();
+    return [document.getElementById("mode").value, ...planner.viewer.shown.states];
+  };
+  while (!window.planner) await sleep(1);
+  found.early = [planner.position === undefined, show("plans")];
+  await exact();
+  document.getElementById("keep").click();
+  document.getElementById("reset").click();
+  await exact();
+  found.scale = [Number(document.getElementById("high").textContent), Math.max(...planner.movement(planner.kept))];
+  const {viewer} = planner, canvas = viewer.three.renderer.domElement, box = canvas.getBoundingClientRect();
+  const drawn = [], {renderer} = viewer.three, render = renderer.render;
+  renderer.render = (...given) => { drawn.push(planner.gizmo.getHelper().visible); render.apply(renderer, given); };
+  for (const mode of ["side", "split", "after"]) {
+    drawn.length = 0;
+    show(mode);
+    found[mode] = drawn.slice(-(mode === "after" ? 1 : 2));
+  }
+  show("side");
+  const at = planner.handle.position.clone().project(viewer.three.camera), grabbed = share => {
+    for (let y = 30; y < 90; y += 4) {
+      canvas.dispatchEvent(new PointerEvent("pointermove", {pointerType: "mouse", bubbles: true, button: -1,
+        clientX: box.left + (share + (at.x + 1) / 4) * box.width,
+        clientY: box.top + (1 - at.y) / 2 * box.height - y}));
+      if (planner.gizmo.axis === "Z") return true;
+    }
+    return false;
+  };
+  found.grabbed = [grabbed(0), grabbed(0.5)];
+  return found;
+})()"""
 
 
 @pytest.fixture(scope="module")
@@ -160,17 +240,47 @@ def test_a_report_of_the_plan_is_written_beside_the_scene(served, tmp_path):
     assert "chin" in text and "<svg" in text and (tmp_path / "head_live_plan.h5").is_file()
 
 
-def test_a_bone_is_dragged_and_the_face_follows(live, served):
+def browsed(live, served, script, size):
+    """Returns what a script finds in the page."""
     needs_browser()
     server, address = served
-    server.page = live.page(SCENE).replace(b"</body>", f"<script>{SCRIPT}</script></body>".encode())
+    server.page = live.page(SCENE).replace(b"</body>", f"<script>{HELPERS}{script}{TOLD}</script></body>".encode())
     with tempfile.TemporaryDirectory() as profile:
         message = subprocess.run(
             [CHROMIUM, *[one for one in OPTIONS if "NOTFOUND" not in one],
-             f"--user-data-dir={profile}", "--window-size=390,844", "--virtual-time-budget=60000",
+             f"--user-data-dir={profile}", f"--window-size={size}", "--virtual-time-budget=60000",
              "--dump-dom", address], capture_output=True, text=True, timeout=110).stdout
     found = json.loads(FOUND.search(message)[1].replace("&amp;", "&"))
     assert "error" not in found, found
+    return found
+
+
+def test_a_face_of_the_former_plan_is_marked_as_such(live, served):
+    found = browsed(live, served, FORMER, "1200,900")
+    first, typed, undone, preview = (found[name] for name in ("first", "typed", "undone", "preview"))
+    assert first["kind"] == "exact" and "foremost" in first["measured"] and first["unit"] == "movement, mm"
+    for former in (typed, found["missing"]):
+        assert former["kind"] == "former" and "former plan" in former["mark"] and former["measured"] == ""
+        assert former["which"] == "former plan" and former["unit"] == "former plan, mm"
+        assert former["under"].startswith("former plan: ") and former["off"] == [True, True]
+        assert former["angles"] == "hidden"
+    assert found["stays"]
+    for own in (undone, preview):
+        assert own["kind"] == "preview" and own["which"] == "now" and own["off"] == [False, False]
+    assert undone["measured"] == first["measured"] and found["then"]["kind"] == "exact"
+
+
+def test_plan_a_and_the_handle_are_shown_where_they_belong(live, served):
+    found = browsed(live, served, VIEWS, "1200,900")
+    assert found["early"] == [True, ["after", 1, 1]], "no plan A before the first answer"
+    high, farthest = found["scale"]
+    assert farthest > 3 and high >= farthest, "the scale reaches to plan A"
+    assert found["side"] == [False, True] and found["split"] == [True, True] and found["after"] == [True]
+    assert found["grabbed"] == [False, True]
+
+
+def test_a_bone_is_dragged_and_the_face_follows(live, served):
+    found = browsed(live, served, SCRIPT, "390,844")
     assert found["pieces"] == ["mandible", "maxilla", "chin"] and 3 < found["first"] < 8
     assert found["during"] == "preview" and found["undone"]
     assert 0.5 < abs(found["dragged"]) < 2 and 0 < found["off"] < 0.5
