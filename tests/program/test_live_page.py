@@ -93,7 +93,8 @@ unpack = buffer => {
 (async () => {
   const text = id => document.getElementById(id)?.textContent, found = {};
   const seen = () => ({mark: mark().textContent, kind: mark().className, measured: text("measured"),
-    which: text("which"), unit: text("unit"), angles: getComputedStyle(document.getElementById("angles")).visibility,
+    which: text("which"), unit: text("unit"),
+    angles: getComputedStyle(document.getElementById("angles")).visibility,
     off: ["keep", "save_stl"].map(id => document.getElementById(id).disabled),
     under: planner.describe({state: 1, at: () => [0, 0, 0]})});
   const type = value => {
@@ -137,7 +138,10 @@ VIEWS = """
   found.scale = [Number(document.getElementById("high").textContent), Math.max(...planner.movement(planner.kept))];
   const {viewer} = planner, canvas = viewer.three.renderer.domElement, box = canvas.getBoundingClientRect();
   const drawn = [], {renderer} = viewer.three, render = renderer.render;
-  renderer.render = (...given) => { drawn.push(planner.gizmo.getHelper().visible); render.apply(renderer, given); };
+  renderer.render = (...given) => {
+    drawn.push(planner.gizmo.getHelper().visible);
+    render.apply(renderer, given);
+  };
   for (const mode of ["side", "split", "after"]) {
     drawn.length = 0;
     show(mode);
@@ -244,7 +248,8 @@ def browsed(live, served, script, size):
     """Returns what a script finds in the page."""
     needs_browser()
     server, address = served
-    server.page = live.page(SCENE).replace(b"</body>", f"<script>{HELPERS}{script}{TOLD}</script></body>".encode())
+    script = f"<script>{HELPERS}{script}{TOLD}</script></body>"
+    server.page = live.page(SCENE).replace(b"</body>", script.encode())
     with tempfile.TemporaryDirectory() as profile:
         message = subprocess.run(
             [CHROMIUM, *[one for one in OPTIONS if "NOTFOUND" not in one],
