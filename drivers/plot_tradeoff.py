@@ -175,7 +175,7 @@ def judge_estimates(rows):
 
 def main():
     every = []
-    for name in words(__doc__, 1):
+    for name in (given.removesuffix(".csv") for given in words(__doc__, 1)):
         rows = read(name)
         draw_study(name, rows)
         draw_map(name)

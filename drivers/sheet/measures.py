@@ -23,9 +23,11 @@ def read_norms(file):
     """[{source, population, norms: {measure: [mean, standard deviation]}}] of a file."""
     with reading(file, "norms as in docs/guide/report.md"):
         stored = json.loads(pathlib.Path(file).read_text(encoding="utf-8-sig"))
+        if not (isinstance(stored, list) and stored):
+            raise ValueError("not a list of groups")
         for group in stored:
             for name, (mean, deviation) in group["norms"].items():
-                if not (name in MEASURES and math.isfinite(mean) and deviation > 0):
+                if not (name in MEASURES and math.isfinite(mean) and 0 < deviation < math.inf):
                     raise ValueError(f"{name}: not a measure, or not mean and deviation")
             group["population"], group["source"]
     return stored

@@ -62,7 +62,7 @@ def test_another_rest_position_is_looked_for_on_request(session):
     """Tissue of the chin rests on either side of the edge of its cut, by 0.13 mm of the skin."""
     plan = {"maxilla": {"translate": [0, -3, 0]}, "mandible": {"translate": [0, -4, 0]},
             "chin": {"translate": [0, -6, 0]}}
-    plain = session.solve(plan, accuracy=0.01, base="rest")
+    plain = session.solve(plan, accuracy=np.float32(0.01), base="rest")
     face = session.solve(plan, accuracy=0.01, other_rest=True)
     assert plain.other_rest is None and "other_rest" not in plain.info
     assert face.converged and face.info["evaluations"] > plain.info["evaluations"]
@@ -143,6 +143,8 @@ def test_a_session_has_a_whole_number_of_ranks():
     for ranks in (0, -1, "two", 1.5):
         with pytest.raises(ValueError, match="ranks must be a whole number from 1, not "):
             repose.Session(SCENE, ranks=ranks)
+    with pytest.raises(ValueError, match="verify_every must be a whole number from 0, not -1"):
+        repose.Session(SCENE, verify_every=-1)
 
 
 def test_derivatives_refuse_what_the_plan_does_not_have(session):

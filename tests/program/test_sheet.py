@@ -216,6 +216,21 @@ def test_norms_with_a_byte_order_mark_are_read(tmp_path):
     assert read_norms(tmp_path / "norms.json") == [group]
 
 
+@pytest.mark.parametrize("stored", ['""', "{}", "[]", '[{"source": "ours", "population": "12", "norms": '
+                                    '{"facial convexity": [9, Infinity]}}]'])
+def test_norms_that_are_none_are_refused(tmp_path, stored):
+    (tmp_path / "norms.json").write_text(stored)
+    with pytest.raises(Unusable, match="norms.json"):
+        read_norms(tmp_path / "norms.json")
+
+
+def test_a_plan_of_one_piece_is_written(tmp_path):
+    scene = tmp_path / "scene.yaml"
+    scene.write_text("skin: face.ply\n")
+    Scene(scene).with_plan("chin", tmp_path / "planned.yaml")
+    assert "pieces: [chin]" in (tmp_path / "planned.yaml").read_text()
+
+
 # ----- colors of a skin
 
 

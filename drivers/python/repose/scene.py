@@ -92,6 +92,7 @@ class Scene:
     def with_plan(self, pieces, path, translate=(10, 10, 10), rotate=(10, 10, 10)):
         """Writes the scene with a plan of these pieces to `path` and returns it. `path` must lie in
         the scene's folder, as files that a scene names are relative to it."""
+        pieces = [pieces] if isinstance(pieces, str) else list(pieces)
         path = pathlib.Path(path).resolve()
         if path.parent != self.path.parent:
             raise ValueError(f"{path}: must lie in {self.path.parent}")

@@ -169,6 +169,8 @@ class Session:
                  niceness=0):
         if not isinstance(ranks, int) or ranks < 1:
             raise ValueError(f"ranks must be a whole number from 1, not {ranks!r}")
+        if not isinstance(verify_every, int) or verify_every < 0:
+            raise ValueError(f"verify_every must be a whole number from 0, not {verify_every!r}")
         path = pathlib.Path(getattr(scene, "path", scene)).resolve()
         command = [absolute_program(str(program), "name repose-live") if program else find_program(), str(path)]
         if ranks > 1:
@@ -232,7 +234,7 @@ class Session:
         if other_rest:
             request |= {"base": "rest", "other_rest": True}
         if accuracy is not None:
-            request["accuracy"] = accuracy
+            request["accuracy"] = float(accuracy)
         if gradient_of:
             request["gradient_of"] = [{"point": int(row), "weight": [float(w) for w in weight]}
                                       for row, weight in gradient_of.items()]
