@@ -89,8 +89,7 @@ std::vector<ProfilePoint> between(const std::vector<ProfilePoint>& profile, doub
 
 std::optional<ProfilePoint> farthest_from_chord(const std::vector<ProfilePoint>& profile,
                                                 const ProfilePoint& a, const ProfilePoint& b,
-                                                int sign) {
-  constexpr double flat = 0.25;  // mm
+                                                int sign, double flat) {
   if (profile.empty()) return std::nullopt;
   const ProfilePoint along = (b.y() >= a.y() ? b - a : a - b).normalized();
   const ProfilePoint ahead(-along.y(), along.x());  // to the left of upwards: in front
@@ -116,11 +115,15 @@ std::optional<ProfilePoint> foremost_of(const std::vector<ProfilePoint>& profile
 
 std::optional<ProfilePoint> chin_of(const std::vector<ProfilePoint>& profile, double from_z,
                                     double to_z) {
-  constexpr double end = 0.5;  // mm
+  constexpr double flat = 1;  // mm
   const std::vector<ProfilePoint> inside = between(profile, from_z, to_z);
-  const auto foremost = foremost_of(inside);
-  if (!foremost || foremost->y() < inside.back().y() - end) return foremost;
-  return farthest_from_chord(inside, inside.front(), inside.back(), 1);
+  if (inside.size() < 2) return foremost_of(inside);
+  const ProfilePoint end = inside.back(), rise = end - inside.front();
+  const double chord = std::max(-rise.x() / rise.y(), 0.0);
+  double slope = chord;  // of the line, forward for upward
+  for (const ProfilePoint& p : inside)
+    if (p.y() < end.y()) slope = std::min(slope, (flat - end.x() + p.x()) / (end.y() - p.y()));
+  return farthest_from_chord(inside, {0, 0}, {-std::max(slope, 0.0), 1}, 1, flat);
 }
 
 }  // namespace repose::anatomy

@@ -46,14 +46,15 @@ std::vector<ProfilePoint> between(const std::vector<ProfilePoint>& profile, doub
                                   double to_z);
 /// The point of a profile that lies farthest in front of the line through `a` and `b` (behind it
 /// with sign −1), of a flat stretch its middle: the mean of heights, weighted with what the
-/// distance is above 0.25 mm less than the largest. Nothing where the profile has no point.
+/// distance is above the largest less `flat` mm. Nothing where the profile has no point.
 std::optional<ProfilePoint> farthest_from_chord(const std::vector<ProfilePoint>& profile,
                                                 const ProfilePoint& a, const ProfilePoint& b,
-                                                int sign);
+                                                int sign, double flat = 0.5);
 /// The foremost point of a profile; of a flat stretch its middle, as above.
 std::optional<ProfilePoint> foremost_of(const std::vector<ProfilePoint>& profile);
-/// The chin: the foremost point of a profile between two heights or, where the profile still comes
-/// forward at the upper one, the farthest in front of the chord between its ends.
+/// The chin: the foremost point of a profile between two heights. Where the profile still comes
+/// forward at the upper one, the farthest in front of a line that leans forward as much as leaves
+/// that end 1 mm behind, or is parallel to the chord between the ends.
 std::optional<ProfilePoint> chin_of(const std::vector<ProfilePoint>& profile, double from_z,
                                     double to_z);
 

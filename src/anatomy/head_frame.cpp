@@ -132,9 +132,8 @@ std::vector<Fit> first_planes(const Vec3& middle, const MirrorFit& fit) {
   return fits;
 }
 
-Fit refine(Plane plane, const MirrorFit& fit) {
+Fit refine(Plane plane, const MirrorFit& fit, double end = 1e-5) {
   constexpr int rounds = 60;
-  constexpr double end = 1e-5;  // radians, and 1e-3 mm
   for (int round = 0; round < rounds; ++round) {
     const Plane next = fit.next(plane);
     const double change = next.normal.cross(plane.normal).norm() +
@@ -151,12 +150,14 @@ Plane fit_plane(const surface::Surface& skull) {
   const surface::TriangleTree tree(skull);
   const std::vector<Vec3> few = thinned(skull.points, 300), more = thinned(skull.points, 3000),
                           many = thinned(skull.points, 40000);
-  const MirrorFit coarse(tree, few, 10), fine(tree, more, 2), finest(tree, many, 2);
+  const MirrorFit coarse(tree, few, 10), fine(tree, more, 5), broad(tree, many, 5),
+      finest(tree, many, 2);
   std::vector<Fit> fits = best_of(first_planes(mean_of(few), coarse), 12);
   for (Fit& fit : fits) fit = refine(fit.plane, coarse);
   fits = best_of(std::move(fits), 3);
   for (Fit& fit : fits) fit = refine(fit.plane, fine);
-  return refine(best_of(std::move(fits), 1).front().plane, finest).plane;
+  const Plane best = best_of(std::move(fits), 1).front().plane;
+  return refine(refine(best, broad, 1e-4).plane, finest).plane;
 }
 
 /// The middles of the symphysis, near the plane, and of both rami, the parts farthest from it.

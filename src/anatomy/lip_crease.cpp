@@ -9,6 +9,7 @@ namespace repose::anatomy {
 namespace {
 
 constexpr double arm = 4;          // mm, to the skin above and below that a crease is measured by
+constexpr double averaged = 1.5;   // mm beside a place, over which depths of a crease are averaged
 constexpr double climb = 1;        // mm, by which the crease may rise or fall from column to column
 constexpr double share = 0.25;     // of the depth in the middle, where it ends
 constexpr double ending = 2.5;     // mm, over which it is that shallow
@@ -78,15 +79,42 @@ std::optional<Gap> middle_gap(const FrontMap& skin, double z) {
   return open >= parted * columns ? nearest : std::nullopt;
 }
 
-/// The height within `climb` of z at which the crease is deepest.
-std::optional<std::pair<double, double>> deepest(const FrontMap& skin, double x, double z,
-                                                 double reach) {
-  std::optional<std::pair<double, double>> best;
-  for (double at = z - reach; at <= z + reach; at += skin.spacing()) {
-    const auto depth = crease_depth(skin, x, at);
-    if (depth && (!best || *depth > best->second)) best = std::pair(at, *depth);
+/// The mean depth of a crease over columns up to `averaged` beside x, so that noise of single
+/// vertices does not end it; nothing where one of them has none.
+std::optional<double> mean_depth(const FrontMap& skin, double x, double z) {
+  double sum = 0;
+  int columns = 0;
+  for (double at = x - averaged; at <= x + averaged; at += skin.spacing(), ++columns) {
+    const auto depth = crease_depth(skin, at, z);
+    if (!depth) return std::nullopt;
+    sum += *depth;
   }
-  return best;
+  return sum / columns;
+}
+
+/// A place of a crease in one column of the map.
+struct Deepest {
+  double height, depth;  // mm
+  double y;              // of the skin
+};
+
+/// The place within `reach` of z at which the crease is deepest, of a flat stretch its middle.
+std::optional<Deepest> deepest(const FrontMap& skin, double x, double z, double reach) {
+  constexpr double flat = 0.2, stretch = 2;  // mm
+  std::vector<std::pair<double, double>> places;
+  for (double at = z - reach; at <= z + reach; at += skin.spacing())
+    if (const auto depth = mean_depth(skin, x, at)) places.emplace_back(at, *depth);
+  if (places.empty()) return std::nullopt;
+  const auto [height, depth] =
+      *std::ranges::max_element(places, {}, &std::pair<double, double>::second);
+  double weights = 0, moment = 0;
+  for (const auto& [at, other] : places) {
+    if (std::abs(at - height) > stretch) continue;
+    const double weight = std::max(other - depth + flat, 0.0);
+    weights += weight;
+    moment += weight * at;
+  }
+  return Deepest{moment / weights, depth, *skin.depth(x, height)};
 }
 
 /// The crease on one side from a place, to a known corner of the mouth or, without it, to where it
@@ -107,11 +135,11 @@ std::vector<Vec3> follow_side(const FrontMap& skin, const Vec3& from, double dep
   for (double x = std::abs(from.x()) + step; x <= last; x += step) {
     const auto place = deepest(skin, side * x, expected(x), climb);
     if (!place) break;
-    shallow = place->second < share * depth ? shallow + step : 0;
+    shallow = place->depth < share * depth ? shallow + step : 0;
     if (!end && shallow > ending) break;
-    tilt = 0.9 * tilt + 0.1 * (place->first - z) / step;
-    z = 0.5 * (z + tilt * step) + 0.5 * place->first;
-    points.emplace_back(side * x, *skin.depth(side * x, place->first), z);
+    tilt = 0.9 * tilt + 0.1 * (place->height - z) / step;
+    z = 0.5 * (z + tilt * step) + 0.5 * place->height;
+    points.emplace_back(side * x, place->y, z);
   }
   if (!end && shallow > 0)
     points.resize(points.size() - std::min(points.size(), static_cast<size_t>(shallow / step)));
@@ -197,11 +225,11 @@ LipCrease follow_touching(const FrontMap& skin, double z, const std::optional<Ve
   const auto middle = deepest(skin, 0, z, arm);
   if (!middle) return {};
   LipCrease crease;
-  const Vec3 start(0, *skin.depth(0, middle->first), middle->first);
-  crease.points = follow_side(skin, start, middle->second, -1, right);
+  const Vec3 start(0, middle->y, middle->height);
+  crease.points = follow_side(skin, start, middle->depth, -1, right);
   std::reverse(crease.points.begin(), crease.points.end());
   crease.points.push_back(start);
-  const auto other = follow_side(skin, start, middle->second, 1, left);
+  const auto other = follow_side(skin, start, middle->depth, 1, left);
   crease.points.insert(crease.points.end(), other.begin(), other.end());
   return crease;
 }

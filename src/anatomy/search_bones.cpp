@@ -125,47 +125,61 @@ bool is_cut_off(const Mandible& mandible, const Vec3& top) {
   return false;
 }
 
-void search_condyle(const Mandible& mandible, int side, Search& search) {
-  std::vector<Vec3> points;
-  for (const Vec3& p : mandible.points) points.push_back(search.frame().to_frame(p));
+/// The mean of points, each weighted with how much its value exceeds the largest less `range`.
+template <class Value>
+Vec3 extreme_of(const std::vector<Vec3>& points, double range, Value&& value) {
+  double largest = -INFINITY, weights = 0;
+  for (const Vec3& p : points) largest = std::max(largest, value(p));
+  Vec3 moment = Vec3::Zero();
+  for (const Vec3& p : points) {
+    const double weight = std::max(value(p) - largest + range, 0.0);
+    weights += weight;
+    moment += weight * p;
+  }
+  return moment / weights;
+}
+
+/// The middle of a condyle's box, of what lies near its top.
+Vec3 middle_of_condyle(const std::vector<Vec3>& points, const Vec3& top) {
+  Eigen::AlignedBox3d box(top);
+  for (const Vec3& p : points)
+    if (p.z() >= top.z() - condyle_depth && std::abs(p.y() - top.y()) <= condyle_reach)
+      box.extend(p);
+  return box.center();
+}
+
+void search_ramus(const Mandible& mandible, int side, Search& search) {
+  constexpr double range = 2;  // mm, of heights and of sums of way back and down
   const std::string name = side > 0 ? "left" : "right";
   double front = INFINITY, back = -INFINITY;
-  for (const Vec3& p : points) {
+  std::vector<Vec3> points, rear_points;
+  for (const Vec3& point : mandible.points) {
+    const Vec3 p = search.frame().to_frame(point);
     front = std::min(front, p.y());
     back = std::max(back, p.y());
+    if (side * p.x() > 15) points.push_back(p);
   }
   const double from = back - rear * (back - front);
-  const auto aside = [&](const Vec3& p) { return side * p.x() > 15; };
-  const Vec3* top = nullptr;
-  const Vec3* angle = nullptr;
-  double highest = -INFINITY;
-  for (const Vec3& p : points) {
-    if (!aside(p)) continue;
-    highest = std::max(highest, p.z());
-    if (p.y() >= from && (!top || p.z() > top->z())) top = &p;
-    if (!angle || p.y() - p.z() > angle->y() - angle->z()) angle = &p;
-  }
-  if (!top || !angle)
+  for (const Vec3& p : points)
+    if (p.y() >= from) rear_points.push_back(p);
+  if (rear_points.empty())
     return search.lack(fmt::format("condyle_{}_center", name),
                        fmt::format("MANDIBLE has no {} ramus", name));
-  search.put(fmt::format("gonion_{}", name), *angle);
-  if (is_cut_off(mandible, search.frame().to_scan(*top)))
+  const auto height = [](const Vec3& p) { return p.z(); };
+  search.put(fmt::format("gonion_{}", name),
+             extreme_of(points, range, [](const Vec3& p) { return p.y() - p.z(); }));
+  const Vec3 top = extreme_of(rear_points, range, height);
+  if (is_cut_off(mandible, search.frame().to_scan(top)))
     return search.lack(
         fmt::format("condyle_{}_center", name),
         fmt::format("MANDIBLE is cut off at its {} condyle, where the scan ends", name));
-  if (highest - top->z() > coronoid)
+  const double higher = std::ranges::max(points, {}, height).z() - top.z();
+  if (higher > coronoid)
     search.remark(fmt::format(
         "the {} ramus ends {:.0f} mm higher in front, at the coronoid process, than behind: check "
         "whether its condyle is in MANDIBLE; the axes of the head follow the condyles",
-        name, highest - top->z()));
-  Vec3 low = *top, high = *top;
-  for (const Vec3& p : points)
-    if (aside(p) && p.z() >= top->z() - condyle_depth &&
-        std::abs(p.y() - top->y()) <= condyle_reach) {
-      low = low.cwiseMin(p);
-      high = high.cwiseMax(p);
-    }
-  search.put(fmt::format("condyle_{}_center", name), (low + high) / 2);
+        name, higher));
+  search.put(fmt::format("condyle_{}_center", name), middle_of_condyle(points, top));
 }
 
 /// Remarks on a ramus that is far shorter than the other one: its condyle may be missing.
@@ -287,7 +301,7 @@ Mandible::Mandible(const surface::Surface& surface) : surface(surface), end(surf
 
 void search_bones(const surface::Surface& skull, const Mandible& mandible, Search& search) {
   search_symphysis(FrontMap(mandible.surface, search.frame()), mandible.end, search);
-  for (const int side : {-1, 1}) search_condyle(mandible, side, search);
+  for (const int side : {-1, 1}) search_ramus(mandible, side, search);
   remark_uneven(search);
   search_upper_jaw(FrontMap(skull, search.frame()), search);
 }

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""Measures distances of landmarks that repose-landmarks proposes to given ones: of the shipped
-synthetic head, of twelve with other proportions, tilted, and of one real head where it is there.
+"""Measures distances of landmarks that repose-landmarks proposes to given ones: of twelve synthetic
+heads of other proportions, tilted, and of one real head where it is there, also with noise.
 
     tests/benchmark/landmarks.py [-bin build/bin] [-heads 12] [-output docs/guide/landmarks.md]
 
@@ -70,6 +70,29 @@ def distances(options, surfaces, known):
             re.finditer(r"^(\w+) .*proposed ([\d.]+) mm from it", done.text, re.M)}
 
 
+def write_rough(folder, deviation, random):
+    """The real head with noise at its vertices, of this standard deviation in mm."""
+    for part in PARTS:
+        mesh = meshio.read(DATA / f"{part}.ply")
+        mesh.points = mesh.points + deviation * random.standard_normal(mesh.points.shape)
+        meshio.Mesh(mesh.points, mesh.cells).write(folder / f"{part}.ply")
+
+
+def displacements(options, deviation, seeds=5):
+    """Landmark → mm by which noise displaces it, of each of several seeds."""
+    heads = []
+    with tempfile.TemporaryDirectory() as name:
+        folder = pathlib.Path(name)
+        smooth = [DATA / f"{part}.ply" for part in PARTS]
+        run([options.bin / "repose-landmarks", smooth[0], "-skull", smooth[1], "-mandible", smooth[2],
+             "-output", folder / "smooth"], name)
+        for seed in range(seeds):
+            write_rough(folder, deviation, np.random.default_rng(seed))
+            rough = [folder / f"{part}.ply" for part in PARTS]
+            heads.append(distances(options, rough, folder / "smooth.mrk.json"))
+    return heads
+
+
 def table(heads):
     """Rows by landmark, then of all, each of its distances in several heads."""
     names = sorted({name for head in heads for name in head})
@@ -90,6 +113,7 @@ def main():
     if DATA.exists():
         real = distances(options, [DATA / f"{part}.ply" for part in PARTS], DATA / "landmarks.json")
         print_table(HEAD, table([real]), options.output, "real head")
+        print_table(HEAD, table(displacements(options, 0.1)), options.output, "noise")
 
 
 if __name__ == "__main__":

@@ -77,9 +77,19 @@ Completed complete_turned(double degrees) {
   return done;
 }
 
+/// The number before " degrees chin `way`" in the remarks; 0 where there is none.
+int pitch_reported(const Completed& done, const std::string& way) {
+  const std::string before = "the head lies about ";
+  for (const std::string& line : done.remarks)
+    if (const size_t at = line.find(before);
+        at != std::string::npos && line.find(" degrees chin " + way) != std::string::npos)
+      return std::stoi(line.substr(at + before.size()));
+  return 0;
+}
+
 TEST(CompleteScene, AHeadThatIsPitchedInTheScanIsReported) {
-  EXPECT_TRUE(says(complete_turned(-10), "the head lies about 10 degrees chin up in the scan"));
-  EXPECT_TRUE(says(complete_turned(10), "10 degrees chin down"));
+  EXPECT_NEAR(pitch_reported(complete_turned(-10), "up in the scan"), 10, 1);
+  EXPECT_NEAR(pitch_reported(complete_turned(10), "down"), 10, 1);
   EXPECT_FALSE(says(complete_turned(0), "degrees chin"));
   EXPECT_FALSE(says(complete_turned(4), "degrees chin"));
 }

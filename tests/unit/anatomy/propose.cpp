@@ -69,6 +69,20 @@ TEST(ProposeLandmarks, TurnWithTheHead) {
   }
 }
 
+TEST(ProposeLandmarks, NoiseOfVerticesHardlyMovesTheRami) {
+  const Proposal smooth = propose(shipped());
+  for (const unsigned seed : {0u, 1u, 2u}) {
+    std::mt19937 random(seed);
+    std::normal_distribution<double> noise(0, 0.3);
+    Head head = shipped();
+    for (Vec3& p : head.mandible.points) p += Vec3(noise(random), noise(random), noise(random));
+    const Proposal rough = propose(head);
+    for (const char* name :
+         {"gonion_right", "gonion_left", "condyle_right_center", "condyle_left_center"})
+      EXPECT_LT((rough.found.at(name) - smooth.found.at(name)).norm(), 1.5) << name << seed;
+  }
+}
+
 surface::Surface shuffled(const surface::Surface& part, std::mt19937& random) {
   std::vector<int64_t> place(part.points.size());
   std::iota(place.begin(), place.end(), 0);
