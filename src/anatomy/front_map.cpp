@@ -115,15 +115,13 @@ std::optional<ProfilePoint> foremost_of(const std::vector<ProfilePoint>& profile
 
 std::optional<ProfilePoint> chin_of(const std::vector<ProfilePoint>& profile, double from_z,
                                     double to_z) {
-  constexpr double flat = 1;  // mm
+  constexpr double end = 6, flat = 1;  // mm
   const std::vector<ProfilePoint> inside = between(profile, from_z, to_z);
-  if (inside.size() < 2) return foremost_of(inside);
-  const ProfilePoint end = inside.back(), rise = end - inside.front();
-  const double chord = std::max(-rise.x() / rise.y(), 0.0);
-  double slope = chord;  // of the line, forward for upward
-  for (const ProfilePoint& p : inside)
-    if (p.y() < end.y()) slope = std::min(slope, (flat - end.x() + p.x()) / (end.y() - p.y()));
-  return farthest_from_chord(inside, {0, 0}, {-std::max(slope, 0.0), 1}, 1, flat);
+  const auto foremost = farthest_from_chord(inside, {0, 0}, {0, 1}, 1, flat);
+  if (inside.size() < 2) return foremost;
+  const ProfilePoint rise = inside.back() - inside.front();
+  const double share = std::max(1 - (inside.back().y() - foremost->y()) / end, 0.0);
+  return farthest_from_chord(inside, {0, 0}, {share * rise.x() / rise.y(), 1}, 1, flat);
 }
 
 }  // namespace repose::anatomy
