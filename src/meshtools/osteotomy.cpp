@@ -160,10 +160,16 @@ class Sorter {
       minimum = std::min(minimum, distance);
       maximum = std::max(maximum, distance);
     }
+    const char* const wider = std::isfinite(plane.radius) ? ", give a greater radius" : "";
+    if (minimum < 0 && maximum > 0)
+      return fmt::format(
+          ", which lies on both sides of its plane, {:.1f} to {:.1f} mm in front; move the plane{}",
+          minimum, maximum, wider);
     return fmt::format(
-        ", which lies {:.1f} to {:.1f} mm in front of its plane; move the plane's point along its "
-        "normal by a distance between{}",
-        minimum, maximum, std::isfinite(plane.radius) ? ", or give a greater radius" : "");
+        ", which lies {:.1f} to {:.1f} mm in front of its plane; move the plane along its normal "
+        "by "
+        "more than the one and less than the other{}, or name another bone",
+        minimum, maximum, wider);
   }
 
   /// The piece is the cell around the seed, the kerf what the saw took; all else stays.
@@ -176,9 +182,14 @@ class Sorter {
       if (DistanceTree(shell).contains(*plan_.seed)) chosen = cell;
     }
     const Vec3& seed = *plan_.seed;
-    if (!chosen || !DistanceTree(bone_).contains(seed))
+    if (!DistanceTree(bone_).contains(seed))
       base::refuse("{}: the seed of piece '{}', {:g}, is not inside the bone; move it", bone_.name,
                    plan_.piece, seed);
+    if (!chosen)
+      base::refuse(
+          "{}: the seed of piece '{}', {:g}, is in a component of the bone that no cut meets; move "
+          "it",
+          bone_.name, plan_.piece, seed);
     if (parts_[*chosen] == CellPart::kerf)
       base::refuse("{}: the seed of piece '{}', {:g}, is in the kerf; move it", bone_.name,
                    plan_.piece, seed);

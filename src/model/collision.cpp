@@ -273,6 +273,9 @@ std::vector<std::string> describe(const CollisionReport& report, const scene::Sc
     else if (!pair.contact())
       line += requested.clearance > 0 ? fmt::format("stay {:g} mm apart", requested.clearance)
                                       : std::string("do not come to touch");
+    else if (overlapping)
+      line += fmt::format("touch elsewhere or lie {:g} mm deeper at load {:.4f}, at {:.1f}",
+                          requested.clearance + 2 * requested.tolerance, pair.load, pair.at);
     else
       line += fmt::format("come within {:g} mm at load {:.4f}, at {:.1f}",
                           requested.clearance + requested.tolerance, pair.load, pair.at);

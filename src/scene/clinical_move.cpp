@@ -20,13 +20,15 @@ const Osteotomy* cut_of(const Scene& scene, std::size_t bone) {
 constexpr const char* upper_edge = "upper_incisor_edge";
 constexpr const char* lower_edge = "lower_incisor_edge";
 
-/// By the incisors that a bone carries, or the template that made it; a skull with them is no jaw.
+/// By the incisors or the chin that a bone carries; a skull with incisors is no jaw.
 Jaw jaw_of(const Scene& scene, std::size_t bone) {
   const Osteotomy* cut = cut_of(scene, bone);
   if (carrying_bone(scene, lower_edge) == bone) return Jaw::lower;
   const bool apart = cut || base::lower(scene.bones[bone].name) == "maxilla";
   if (apart && carrying_bone(scene, upper_edge) == bone) return Jaw::upper;
-  return cut && cut->made_by == OsteotomyTemplate::genioplasty ? Jaw::chin : Jaw::other;
+  const bool chin = cut && (cut->made_by == OsteotomyTemplate::genioplasty ||
+                            carrying_bone(scene, "pogonion_bone") == bone);
+  return chin ? Jaw::chin : Jaw::other;
 }
 
 /// The first of several bones whose jaw satisfies `matches`, or else the first of them.

@@ -40,7 +40,8 @@ struct Pieces {
 /// Cuts a closed, manifold, outward bone. All cuts are made at once and where they meet, each ends
 /// that parts nothing of the piece: cuts in front of each other's backs leave no trace. With a seed
 /// and a kerf the whole of each cut is sawn. A shell that no cut meets goes with the part that
-/// contains it, or is in front of every plane with the piece, or stays. Where a cut runs exactly
+/// contains it, or with the piece where all cuts are planes without a radius and it is in front of
+/// each, or stays. Where a cut runs exactly
 /// through vertices so that parts would touch in a point, it is shifted by some 1e-4 mm. Computed
 /// with exact predicates and constructions, then rounded. Throws InputError naming bone, piece and
 /// remedy: cuts that miss the bone or end inside it, a piece or a rest that comes out empty, a

@@ -118,7 +118,7 @@ TEST(Decimate, thin_walls_do_not_run_through_each_other) {
   Surface outer = bumpy_ball(24, 0, 1), inner = outer;
   for (Vec3& p : inner.points) p *= 0.992;  // a wall of 0.4 mm
   for (auto& t : inner.triangles) turn(t);
-  const Surface shell = collective_try(outer, inner);
+  const Surface shell = both(outer, inner);
   ASSERT_EQ(inspect(shell).self_intersections, 0);
   const Decimated result = decimated(shell, 1.5);
   EXPECT_EQ(inspect(result.surface).self_intersections, 0);

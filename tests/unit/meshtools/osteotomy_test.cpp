@@ -120,7 +120,7 @@ TEST(Osteotomy, a_seed_chooses_the_piece) {
 }
 
 TEST(Osteotomy, a_disc_cuts_within_its_radius_only) {
-  const Surface dumbbell = collective_try(cube(), cube({150, 0, 0}));
+  const Surface dumbbell = both(cube(), cube({150, 0, 0}));
   Osteotomy plan{"part", {{{50, 50, 50}, {0, 0, 1}, 80}}, {}, 0, {}};
   EXPECT_NEAR(volume(cut(dumbbell, plan).piece), 5e5, 1e-6) << "the other cube stays whole";
   plan.kerf = 1;
@@ -164,14 +164,14 @@ TEST(Osteotomy, a_closed_surface_cuts_out_what_lies_within) {
 
 TEST(Osteotomy, shells_that_no_cut_meets) {
   const Surface cave = turned(cube({40, 40, 10}, 15)), sheath = cube({40, 40, 70}, 15);
-  const Surface bone = collective_try(collective_try(cube(), cave), turned(sheath));
+  const Surface bone = both(both(cube(), cave), turned(sheath));
   const Pieces p = cut(bone, by_plane({0, 0, 50}, {0, 0, 1}));
   EXPECT_NEAR(volume(p.piece), 5e5 - 3375, 1e-6);
   EXPECT_NEAR(volume(p.rest), 5e5 - 3375, 1e-6);
   Osteotomy seeded = by_plane({0, 0, 50}, {0, 0, -1});
   seeded.seed = Vec3(20, 20, 80);
   EXPECT_NEAR(volume(cut(bone, seeded).piece), 5e5 - 3375, 1e-6) << "its cavity is known by place";
-  const Surface with_tooth = collective_try(cube(), cube({40, 40, 105}, 15));
+  const Surface with_tooth = both(cube(), cube({40, 40, 105}, 15));
   EXPECT_NEAR(volume(cut(with_tooth, by_plane({0, 0, 50}, {0, 0, 1})).piece), 5e5 + 3375, 1e-6);
   EXPECT_NEAR(volume(cut(with_tooth, by_plane({0, 0, 50}, {0, 0, -1})).piece), 5e5, 1e-6);
 }
@@ -229,6 +229,10 @@ TEST(Osteotomy, refuses_in_one_line) {
   holds(refused(cube(), seeded), "not inside the bone");
   seeded.seed = Vec3(50, 50, 50.5);
   holds(refused(cube(), seeded), "in the kerf");
+  const Surface two = both(cube(), cube({0, 0, 200}, 100));
+  seeded.seed = Vec3(50, 50, 250);
+  holds(refused(two, seeded), "in a component of the bone that no cut meets");
+  holds(refused(two, by_plane({0, 0, 150}, {0, 0, 1})), "lies on both sides of its plane");
 }
 
 TEST(Osteotomy, a_plane_along_a_face_misses_or_is_refused) {
@@ -239,7 +243,7 @@ TEST(Osteotomy, a_plane_along_a_face_misses_or_is_refused) {
 }
 
 TEST(Osteotomy, bones_that_intersect_themselves) {
-  const Surface crossed = collective_try(boulder(8), cube({20, 20, 20}, 60));
+  const Surface crossed = both(boulder(8), cube({20, 20, 20}, 60));
   const std::string why = refusal([&] { cut_bone(crossed, by_plane({0, 0, 30}, {0.1, 0, 1})); });
   EXPECT_NE(why.find("intersects itself"), std::string::npos) << why;
   const Pieces away = cut_bone(crossed, by_plane({0, 0, -20}, {0.1, 0, 1}));

@@ -201,6 +201,18 @@ TEST(Collisions, report_and_none_change_nothing) {
       << remarks[0];
 }
 
+TEST(Collisions, overlapping_bones_are_said_to_lie_deeper) {
+  const std::vector<surface::Surface> boxes = {box("upper", {0, 0, 25}, {50, 50, 30}), jaws[1]};
+  const scene::Collision requested{scene::CollisionMode::report, 0, 0.05};
+  const std::vector<RigidMotion> moves = {{}, RigidMotion::translation({0, 0, 3})};
+  const std::string line =
+      describe(follow_moves(boxes, moves, requested), scene_of(boxes, moves), requested).at(0);
+  EXPECT_NE(line.find("5.00 mm inside one another at the start: touch elsewhere or lie 0.1 mm "
+                      "deeper at load 0.03"),
+            std::string::npos)
+      << line;
+}
+
 TEST(Collisions, stop_refuses_the_scene) {
   scene::Scene scene = scene_of(jaws, {{}, RigidMotion::translation({0, 0, 20})});
   scene.collision = scene::Collision{scene::CollisionMode::stop, 0, 0.05};

@@ -387,6 +387,16 @@ TEST(ClinicalMove, TurnsAboutLandmarksWhereTheirBoneIs) {
   expect_near(turned("yaw: 5, pivot: upper_incisor_edge").apply(advanced), advanced);
 }
 
+TEST(ClinicalMove, TurnsAChinCutByItsOwnPlaneAboutPogonion) {
+  const Vec3 pogonion = head()["pogonion_bone"];
+  const Scene scene = read(head(), fmt::format("osteotomies:\n"
+                                               "  - {{bone: mandible, piece: chin, planes: "
+                                               "[{{point: [0, 0, {}], normal: [0, 0, -1]}}]}}\n"
+                                               "moves: [{{bone: chin, clinical: {{yaw: 3}}}}]\n",
+                                               pogonion.z() + 5));
+  expect_near(scene.moves[2].apply(pogonion), pogonion);
+}
+
 TEST(ClinicalMove, RefusesTargetsBesideAnUnknownJaw) {
   const std::string by_disc =
       "osteotomies:\n"

@@ -70,7 +70,7 @@ TEST(Defects, a_bow_tie_is_a_non_manifold_vertex_and_two_components) {
 }
 
 TEST(Defects, crossing_triangles_are_counted_in_pairs) {
-  Surface s = collective_try(patch(1), {"", {{1, 5, -5}, {2, 5, -5}, {1, 5, 5}}, {{0, 1, 2}}});
+  Surface s = both(patch(1), {"", {{1, 5, -5}, {2, 5, -5}, {1, 5, 5}}, {{0, 1, 2}}});
   Defects d = inspect(s);
   EXPECT_EQ(d.self_intersections, 1);
   EXPECT_EQ(d.first_self_intersection[0], 1);
@@ -108,7 +108,7 @@ TEST(Defects, seams_of_unwelded_triangles_are_no_self_intersections) {
 }
 
 TEST(Defects, components_duplicates_and_isolated_vertices) {
-  Surface s = collective_try(cube(), cube(Vec3(300, 0, 0)));
+  Surface s = both(cube(), cube(Vec3(300, 0, 0)));
   EXPECT_EQ(describe(inspect(s)), "closed, 2 components, no defect");
   const double diagonal = Vec3(400, 100, 100).norm();
   s.points.push_back(s.points[3] + Vec3(0.5e-9 * diagonal, 0, 0));

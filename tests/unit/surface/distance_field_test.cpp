@@ -109,8 +109,8 @@ TEST(DistanceField, is_negative_wherever_the_winding_number_is_not_0) {
   Surface inverted = large, cavity = box({-12, -12, -12}, {12, 12, 12});
   for (Triangle& t : inverted.triangles) turn(t);
   for (Triangle& t : cavity.triangles) turn(t);
-  const Surface overlapping = collective_try(large, box({5, -10, -10}, {30, 10, 10})),
-                hollow = collective_try(large, cavity);
+  const Surface overlapping = both(large, box({5, -10, -10}, {30, 10, 10})),
+                hollow = both(large, cavity);
   for (const double spacing : spacings) {
     EXPECT_LT(DistanceField(inverted, spacing, reach).value({14, 3, 2}), 0);
     EXPECT_EQ(DistanceField(inverted, spacing, reach).value({40, 3, 2}), reach);

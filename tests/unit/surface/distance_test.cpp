@@ -161,7 +161,7 @@ TEST(Distance, hits_at_distance_zero_count_and_reach_bounds) {
 }
 
 TEST(Distance, contains_equals_the_winding_number) {
-  const Surface s = collective_try(ball(Vec3::Zero()), ball(Vec3(120, 0, 0)));
+  const Surface s = both(ball(Vec3::Zero()), ball(Vec3(120, 0, 0)));
   const DistanceTree tree(s);
   Random random;
   int inside = 0;

@@ -29,7 +29,7 @@ Surface scaled(Surface s, double factor) {
 TEST_F(Load, good_surfaces_of_either_role) {
   const auto open = write("open.off", off_text(patch()));
   EXPECT_EQ(load_surface(open, Role::skin).triangles, patch().triangles);
-  const auto two = write("two.off", off_text(collective_try(cube(), cube(Vec3(300, 0, 0)))));
+  const auto two = write("two.off", off_text(both(cube(), cube(Vec3(300, 0, 0)))));
   EXPECT_EQ(inspect(load_surface(two, Role::bone)).components, 2);
   EXPECT_EQ(load_surface(write("cube.stl", stl_binary(cube())), Role::skin).points.size(), 8u);
 }
@@ -93,7 +93,7 @@ TEST_F(Load, a_moebius_strip_has_no_orientation) {
 }
 
 TEST_F(Load, a_skin_in_pieces_and_an_open_bone) {
-  EXPECT_TRUE(says(refused(collective_try(patch(), cube(Vec3(0, 0, 50))), Role::skin),
+  EXPECT_TRUE(says(refused(both(patch(), cube(Vec3(0, 0, 50))), Role::skin),
                    "2 separate components (the largest of 32 and 12 triangles)"));
   Surface open = cube();
   open.triangles.erase(open.triangles.begin() + 3);

@@ -44,7 +44,7 @@ inline Surface patch(int n = 4) {
 }
 
 /// Both surfaces in one, nothing shared.
-inline Surface collective_try(Surface a, const Surface& b) {
+inline Surface both(Surface a, const Surface& b) {
   const auto shift = static_cast<int64_t>(a.points.size());
   a.points.insert(a.points.end(), b.points.begin(), b.points.end());
   for (const auto& t : b.triangles)

@@ -78,7 +78,7 @@ TEST_F(Weld, no_flip_makes_a_non_manifold_edge) {
 }
 
 TEST_F(Weld, closed_surfaces_turn_outwards) {
-  Surface s = collective_try(cube(), cube(Vec3(300, 0, 0)));
+  Surface s = both(cube(), cube(Vec3(300, 0, 0)));
   for (size_t t = 5; t < s.triangles.size(); t += 2) turn(s.triangles[t]);
   for (size_t t = 0; t < 12; ++t) turn(s.triangles[t]);
   const Surface welded = weld_and_orient(s);
@@ -87,8 +87,8 @@ TEST_F(Weld, closed_surfaces_turn_outwards) {
 }
 
 TEST_F(Weld, the_wall_of_a_cavity_faces_the_cavity) {
-  Surface s = collective_try(cube(), cube(Vec3(20, 20, 20), 60));
-  s = collective_try(s, cube(Vec3(40, 40, 40), 20));
+  Surface s = both(cube(), cube(Vec3(20, 20, 20), 60));
+  s = both(s, cube(Vec3(40, 40, 40), 20));
   const Surface welded = weld_and_orient(s);
   EXPECT_NEAR(volume(welded), 1e6 - 216e3 + 8e3, 1e-6);
   EXPECT_EQ(describe(inspect(welded)), "closed, 3 components, no defect");
