@@ -115,7 +115,7 @@ std::optional<ProfilePoint> foremost_of(const std::vector<ProfilePoint>& profile
 
 std::optional<ProfilePoint> chin_of(const std::vector<ProfilePoint>& profile, double from_z,
                                     double to_z) {
-  constexpr double end = 6, flat = 1;  // mm
+  constexpr double end = 3, flat = 1;  // mm
   const std::vector<ProfilePoint> inside = between(profile, from_z, to_z);
   const auto foremost = farthest_from_chord(inside, {0, 0}, {0, 1}, 1, flat);
   if (inside.size() < 2) return foremost;

@@ -52,7 +52,7 @@ std::optional<ProfilePoint> farthest_from_chord(const std::vector<ProfilePoint>&
                                                 int sign, double flat = 0.5);
 /// The foremost point of a profile; of a flat stretch its middle, as above.
 std::optional<ProfilePoint> foremost_of(const std::vector<ProfilePoint>& profile);
-/// The chin: the foremost point of a profile between two heights. Within 6 mm of the upper one,
+/// The chin: the foremost point of a profile between two heights. Within 3 mm of the upper one,
 /// where the profile still comes forward, the line in front of which points are compared leans
 /// toward the chord between the ends, the more the nearer.
 std::optional<ProfilePoint> chin_of(const std::vector<ProfilePoint>& profile, double from_z,
