@@ -12,11 +12,17 @@ from sheet.script import reading
 
 NORMS = pathlib.Path(__file__).with_name("norms.json")
 
-# Soft tissue, landmark of bone, share of the bone's motion in %, and where it is published.
-FOLLOWS = (("subnasale", "nasal spine", "forward", 60, 90), ("upper lip", "upper incisor", "forward",
-           60, 100), ("upper lip", "upper incisor", "up", 66, 97),
-           ("pogonion", "chin bone", "forward", 90, 100))
-FOLLOWS_SOURCE = "a review of 16 studies, 2016"
+# Soft tissue, landmark of bone, direction → published share of the bone's motion in %, along the
+# direction and against it; the sources are in docs/measurements/ratios.md.
+FOLLOWS = {("subnasale", "nasal spine", "forward"): ((38, 90), None),
+           ("upper lip", "upper incisor", "forward"): ((60, 100), None),
+           ("upper lip", "upper incisor", "up"): ((20, 50), None),
+           ("lower lip", "lower incisor", "forward"): ((20, 80), (66, 100)),
+           ("pogonion", "chin bone", "forward"): ((80, 133), (90, 100))}
+CHIN_ALONE = 77, 91  # of a chin that is moved apart from the teeth
+FORWARD = 1, -1      # axis of a head, sign
+UP = 2, 1
+LEAST = 1  # mm, of a motion of bone that ratios are given of
 
 
 def read_norms(file):
@@ -175,10 +181,11 @@ def occlusion(known):
 
 
 def following(known, bones, result):
-    """[(skin, bone, direction, motions in mm of both, share in %, low, high)] where bone moves by at
-    least a millimeter; the bone nearest to the skin's landmark, where no landmark of it is given."""
+    """[(skin, bone, direction, motions in mm of both, share in %, (low, high) or None)] where bone
+    moves by at least a millimeter; the bone nearest to the skin's landmark, where no landmark of it
+    is given."""
     found = []
-    for skin, hard, direction, low, high in FOLLOWS:
+    for (skin, hard, direction), (along, against) in FOLLOWS.items():
         if skin not in known:
             continue
         pair, name = bones.get(hard), hard
@@ -186,11 +193,31 @@ def following(known, bones, result):
             pair, name = nearest_bone(known[skin][0], result), "bone behind it"
         if pair is None:
             continue
-        axis, sign = (1, -1) if direction == "forward" else (2, 1)
-        soft, bone = (sign * float((p[1] - p[0])[axis]) for p in (known[skin], pair))
-        if abs(bone) >= 1:
-            found.append((skin, name, direction, soft, bone, 100 * soft / bone, low, high))
+        way = FORWARD if direction == "forward" else UP
+        soft, bone = motion(known[skin], *way), motion(pair, *way)
+        if abs(bone) < LEAST:
+            continue
+        published = along if bone > 0 else against
+        if hard == "chin bone":
+            published = published_at_chin(bone, bones.get("lower incisor"), published)
+        found.append((skin, name, direction, soft, bone, 100 * soft / bone, published))
     return found
+
+
+def motion(places, axis, sign):
+    return sign * float((places[1] - places[0])[axis])
+
+
+def published_at_chin(bone, incisor, of_jaw):
+    """The range of a jaw, of a chin that is moved alone, or of both where it moves with the jaw and
+    apart from it, or that is not known."""
+    low, high = CHIN_ALONE
+    if incisor is None:
+        return min(low, of_jaw[0]), max(high, of_jaw[1])
+    with_jaw = motion(incisor, *FORWARD)
+    if abs(bone - with_jaw) < LEAST:
+        return of_jaw
+    return CHIN_ALONE if abs(with_jaw) < LEAST else (min(low, of_jaw[0]), max(high, of_jaw[1]))
 
 
 def nearest_bone(point, result):

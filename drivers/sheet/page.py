@@ -12,8 +12,8 @@ from sheet import RAMP
 from sheet.landmarks import (BEYOND, BONES, NEAR, Parts, by_shape, known_places, on_surface,
                              place_landmarks)
 from sheet.meshes import Pack, coarser
-from sheet.measures import (FOLLOWS_SOURCE, following, measured, occlusion, reference,
-                            shift_in_words, turns, turns_in_words)
+from sheet.measures import (following, measured, occlusion, reference, shift_in_words, turns,
+                            turns_in_words)
 from sheet.profile import COLORS, cut, drawing, middle_plane, outlines
 from sheet.shown_skin import matching_rows, rows_of_patient
 from sheet.result import Figure
@@ -317,17 +317,18 @@ def profile_section(plans):
 def ratio_table(plans):
     rows = []
     for plan in plans:
-        for skin, bone, direction, soft, hard, share, low, high in following(
+        for skin, bone, direction, soft, hard, share, published in following(
                 plan.known, plan.bones, plan.result):
             label = f"{skin} to {bone}, {direction}"
             rows.append((label if len(plans) == 1 else f"{plan.name}: {label}", tenths(soft),
-                         tenths(hard), Figure(f"{share:.0f} %"), Figure(f"{low}–{high} %")))
+                         tenths(hard), Figure(f"{share:.0f} %"),
+                         Figure("{}–{} %".format(*published)) if published else "–"))
     if not rows:
         return '<p class="note">No soft-to-hard ratio: none of the bones under subnasale, lips and ' \
             "chin moves by a millimeter, or their landmarks are not given.</p>"
     return table(("skin to bone", "skin, mm", "bone, mm", "ratio", "published"), rows) + \
-        f'<p class="note">Published ranges: {FOLLOWS_SOURCE}. A ratio outside them is a ' \
-        "reason to look again, not an error.</p>"
+        '<p class="note">Published ranges of such a motion: docs/measurements/ratios.md names the ' \
+        "sources. A ratio outside them is a reason to look again, not an error.</p>"
 
 
 def region_columns(plans):

@@ -20,7 +20,7 @@ from repose.scene import Scene  # noqa: E402
 from sheet import tables  # noqa: E402
 from sheet.appearance import read_appearance, read_ply  # noqa: E402
 from sheet.landmarks import STANDARD, on_surface, place_landmarks, read_landmarks  # noqa: E402
-from sheet.measures import MEASURES, read_norms  # noqa: E402
+from sheet.measures import MEASURES, following, read_norms  # noqa: E402
 from sheet.meshes import coarser  # noqa: E402
 from sheet.page import plan_table  # noqa: E402
 from sheet.profile import middle_plane  # noqa: E402
@@ -346,3 +346,30 @@ def test_what_cannot_be_written_leaves_the_file_as_it_was(tmp_path, name, part):
                           capture_output=True, preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096)))
     assert done.returncode == 1 and part in done.stderr and len(done.stderr.splitlines()) == 1, done
     assert os.listdir(tmp_path) == [name] and (tmp_path / name).read_text() == "old"
+
+
+def places(y=0.0, z=0.0):
+    """A landmark before and after it moves."""
+    return np.zeros(3), np.array([0, y, z])
+
+
+@pytest.mark.parametrize("landmark, skin, bones, key", [
+    ("upper lip", places(z=1.2), {"upper incisor": places(z=4)}, ("impaction", "upper_lip")),
+    ("upper lip", places(y=-4), {"upper incisor": places(y=-5)}, ("Le Fort I", "upper_lip")),
+    ("subnasale", places(y=-3), {"nasal spine": places(y=-5)}, ("Le Fort I", "subnasale")),
+    ("lower lip", places(y=-3), {"lower incisor": places(y=-5)}, ("advance", "lower_lip")),
+    ("lower lip", places(y=4), {"lower incisor": places(y=5)}, ("set-back", "lower_lip")),
+    ("pogonion", places(y=-7), {"chin bone": places(y=-8), "lower incisor": places()},
+     ("chin", "pogonion_soft")),
+    ("pogonion", places(y=5), {"chin bone": places(y=5), "lower incisor": places(y=5)},
+     ("set-back", "pogonion_soft"))])
+def test_ratios_are_shown_beside_what_is_published_of_their_operation(landmark, skin, bones, key):
+    sys.path.append(str(PROJECT / "tests/benchmark"))
+    published = pytest.importorskip("ratios", reason="no meshio or SciPy").PUBLISHED
+    row, = following({landmark: skin}, bones, None)
+    assert [round(share / 100, 2) for share in row[-1]] == list(published[key][1:])
+
+
+def test_a_ratio_of_which_nothing_is_published_has_no_range():
+    row, = following({"upper lip": places(z=-1)}, {"upper incisor": places(z=-4)}, None)
+    assert row[-1] is None
