@@ -78,15 +78,15 @@ def write_rough(folder, deviation, random):
         meshio.Mesh(mesh.points, mesh.cells).write(folder / f"{part}.ply")
 
 
-def displacements(options, deviation, seeds=5):
-    """Landmark → mm by which noise displaces it, of each of several seeds."""
+def displacements(options, deviation):
+    """Landmark → mm by which noise displaces it, of five seeds, or as many as -heads."""
     heads = []
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
         smooth = [DATA / f"{part}.ply" for part in PARTS]
         run([options.bin / "repose-landmarks", smooth[0], "-skull", smooth[1], "-mandible", smooth[2],
              "-output", folder / "smooth"], name)
-        for seed in range(seeds):
+        for seed in range(min(5, options.heads)):
             write_rough(folder, deviation, np.random.default_rng(seed))
             rough = [folder / f"{part}.ply" for part in PARTS]
             heads.append(distances(options, rough, folder / "smooth.mrk.json"))
