@@ -187,12 +187,13 @@ def test_measures_its_error(environment, tmp_path):
     pytest.importorskip("scipy")
     page = tmp_path / "page.md"
     page.write_text("<!-- phantoms -->\n<!-- end of phantoms -->\n<!-- real head -->\n"
-                    "<!-- end of real head -->\n")
+                    "<!-- end of real head -->\n<!-- noise -->\n<!-- end of noise -->\n")
     result = finish([sys.executable, str(PROJECT / "tests/benchmark/landmarks.py"), "-bin",
-                     str(programs()), "-heads", "2", "-output", str(page)], tmp_path, environment, 60)
+                     str(programs()), "-heads", "1", "-output", str(page)], tmp_path, environment, 120)
     assert (result.returncode, result.stderr) == (0, ""), result
-    mean, most = re.search(r"\*\*all\*\* \| \d+ \| ([\d.]+) \| ([\d.]+) \|", page.read_text()).groups()
-    assert float(mean) < 4 and float(most) < 15
+    tables = re.findall(r"\*\*all\*\* \| \d+ \| ([\d.]+) \| ([\d.]+) \|", page.read_text())
+    for (mean, most), limits in zip(tables, ((4, 15), (6, 15), (1, 4))):
+        assert float(mean) < limits[0] and float(most) < limits[1], tables
 
 
 @pytest.mark.parametrize("jaws", [["upper"], ["lower"], ["upper", "lower"]])
