@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "mean_near_largest.h"
 #include "repose/surface/edges.h"
 
 namespace repose::anatomy {
@@ -94,16 +95,10 @@ std::optional<ProfilePoint> farthest_from_chord(const std::vector<ProfilePoint>&
   const ProfilePoint along = (b.y() >= a.y() ? b - a : a - b).normalized();
   const ProfilePoint ahead(-along.y(), along.x());  // to the left of upwards: in front
   const auto distance = [&](const ProfilePoint& p) { return sign * ahead.dot(p - a); };
-  double maximum = -nothing, weights = 0, moment = 0;
-  for (const ProfilePoint& p : profile) maximum = std::max(maximum, distance(p));
-  for (const ProfilePoint& p : profile) {
-    const double weight = std::max(distance(p) - maximum + flat, 0.0);
-    weights += weight;
-    moment += weight * p.y();
-  }
-  const double height = std::clamp(moment / weights, profile.front().y(), profile.back().y());
-  const auto above =
-      std::ranges::lower_bound(profile, height, {}, [](const ProfilePoint& p) { return p.y(); });
+  const auto height_of = [](const ProfilePoint& p) { return p.y(); };
+  const double height = std::clamp(mean_near_largest(profile, flat, distance, height_of),
+                                   profile.front().y(), profile.back().y());
+  const auto above = std::ranges::lower_bound(profile, height, {}, height_of);
   if (above == profile.begin()) return *above;
   const ProfilePoint low = *std::prev(above), rise = *above - low;
   return low + (height - low.y()) / rise.y() * rise;

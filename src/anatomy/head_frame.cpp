@@ -132,6 +132,8 @@ std::vector<Fit> first_planes(const Vec3& middle, const MirrorFit& fit) {
   return fits;
 }
 
+/// Ends where a step turns the plane by less than `end` radians and moves it by less than 100 times
+/// that in mm.
 Fit refine(Plane plane, const MirrorFit& fit, double end = 1e-5) {
   constexpr int rounds = 60;
   for (int round = 0; round < rounds; ++round) {
@@ -145,7 +147,8 @@ Fit refine(Plane plane, const MirrorFit& fit, double end = 1e-5) {
 }
 
 /// Many directions are tried on few points, the best planes refined on more, and the best of these
-/// on so many that a turned head, which the grid meets otherwise, has the same plane.
+/// on so many that a turned head, which the grid meets otherwise, has the same plane: first with
+/// the broad scale, of one minimum, then with that which leaves out what is not symmetric.
 Plane fit_plane(const surface::Surface& skull) {
   const surface::TriangleTree tree(skull);
   const std::vector<Vec3> few = thinned(skull.points, 300), more = thinned(skull.points, 3000),

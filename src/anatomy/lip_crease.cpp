@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 
+#include "mean_near_largest.h"
 #include "repose/anatomy/propose.h"
 
 namespace repose::anatomy {
@@ -101,20 +103,17 @@ struct Deepest {
 /// The place within `reach` of z at which the crease is deepest, of a flat stretch its middle.
 std::optional<Deepest> deepest(const FrontMap& skin, double x, double z, double reach) {
   constexpr double flat = 0.2, stretch = 2;  // mm
-  std::vector<std::pair<double, double>> places;
+  std::vector<Deepest> places;
   for (double at = z - reach; at <= z + reach; at += skin.spacing())
-    if (const auto depth = mean_depth(skin, x, at)) places.emplace_back(at, *depth);
+    if (const auto depth = mean_depth(skin, x, at))
+      places.push_back({at, *depth, *skin.depth(x, at)});
   if (places.empty()) return std::nullopt;
-  const auto [height, depth] =
-      *std::ranges::max_element(places, {}, &std::pair<double, double>::second);
-  double weights = 0, moment = 0;
-  for (const auto& [at, other] : places) {
-    if (std::abs(at - height) > stretch) continue;
-    const double weight = std::max(other - depth + flat, 0.0);
-    weights += weight;
-    moment += weight * at;
-  }
-  return Deepest{moment / weights, depth, *skin.depth(x, height)};
+  Deepest best = *std::ranges::max_element(places, {}, &Deepest::depth);
+  std::erase_if(places,
+                [&](const Deepest& p) { return std::abs(p.height - best.height) > stretch; });
+  best.height =
+      mean_near_largest(places, flat, std::mem_fn(&Deepest::depth), std::mem_fn(&Deepest::height));
+  return best;
 }
 
 /// The crease on one side from a place, to a known corner of the mouth or, without it, to where it

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "mean_near_largest.h"
 #include "repose/scene/jaw_height.h"
 #include "repose/surface/edges.h"
 #include "scan_end.h"
@@ -36,15 +37,9 @@ std::optional<Vec3> tooth_edge(const FrontMap& map, int sign, const ProfilePoint
     if (end) edges.push_back(*end);
   }
   if (edges.empty()) return std::nullopt;
-  double extreme = edges.front().y();
-  for (const ProfilePoint& edge : edges) extreme = sign * std::max(sign * extreme, sign * edge.y());
-  double weights = 0, moment = 0;
-  for (const ProfilePoint& edge : edges) {
-    const double weight = std::max(level - sign * (extreme - edge.y()), 0.0);
-    weights += weight;
-    moment += weight * edge.x();
-  }
-  return Vec3(0, moment / weights, extreme);
+  const auto end = [&](const ProfilePoint& edge) { return sign * edge.y(); };
+  const auto depth = [](const ProfilePoint& edge) { return edge.x(); };
+  return Vec3(0, mean_near_largest(edges, level, end, depth), sign * largest_of(edges, end));
 }
 
 /// The x of a chin beside the midsagittal plane, mm: the median over its heights of the middle of
@@ -125,21 +120,7 @@ bool is_cut_off(const Mandible& mandible, const Vec3& top) {
   return false;
 }
 
-/// The mean of points, each weighted with how much its value exceeds the largest less `range`.
-template <class Value>
-Vec3 extreme_of(const std::vector<Vec3>& points, double range, Value&& value) {
-  double largest = -INFINITY, weights = 0;
-  for (const Vec3& p : points) largest = std::max(largest, value(p));
-  Vec3 moment = Vec3::Zero();
-  for (const Vec3& p : points) {
-    const double weight = std::max(value(p) - largest + range, 0.0);
-    weights += weight;
-    moment += weight * p;
-  }
-  return moment / weights;
-}
-
-/// The middle of a condyle's box, of what lies near its top.
+/// The center of the box around a condyle's points near its top.
 Vec3 middle_of_condyle(const std::vector<Vec3>& points, const Vec3& top) {
   Eigen::AlignedBox3d box(top);
   for (const Vec3& p : points)
@@ -166,19 +147,21 @@ void search_ramus(const Mandible& mandible, int side, Search& search) {
     return search.lack(fmt::format("condyle_{}_center", name),
                        fmt::format("MANDIBLE has no {} ramus", name));
   const auto height = [](const Vec3& p) { return p.z(); };
+  const auto itself = [](const Vec3& p) { return p; };
+  const auto back_and_down = [](const Vec3& p) { return p.y() - p.z(); };
   search.put(fmt::format("gonion_{}", name),
-             extreme_of(points, range, [](const Vec3& p) { return p.y() - p.z(); }));
-  const Vec3 top = extreme_of(rear_points, range, height);
-  if (is_cut_off(mandible, search.frame().to_scan(top)))
+             mean_near_largest(points, range, back_and_down, itself));
+  const Vec3 summit = std::ranges::max(rear_points, {}, height);
+  if (is_cut_off(mandible, search.frame().to_scan(summit)))
     return search.lack(
         fmt::format("condyle_{}_center", name),
         fmt::format("MANDIBLE is cut off at its {} condyle, where the scan ends", name));
-  const double higher = std::ranges::max(points, {}, height).z() - top.z();
-  if (higher > coronoid)
+  if (const double higher = largest_of(points, height) - summit.z(); higher > coronoid)
     search.remark(fmt::format(
         "the {} ramus ends {:.0f} mm higher in front, at the coronoid process, than behind: check "
         "whether its condyle is in MANDIBLE; the axes of the head follow the condyles",
         name, higher));
+  const Vec3 top = mean_near_largest(rear_points, range, height, itself);
   search.put(fmt::format("condyle_{}_center", name), middle_of_condyle(points, top));
 }
 

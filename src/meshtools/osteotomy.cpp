@@ -160,15 +160,12 @@ class Sorter {
       minimum = std::min(minimum, distance);
       maximum = std::max(maximum, distance);
     }
-    const char* const wider = std::isfinite(plane.radius) ? ", give a greater radius" : "";
+    const char* const wider = std::isfinite(plane.radius) ? ", or give a greater radius" : "";
     if (minimum < 0 && maximum > 0)
-      return fmt::format(
-          ", which lies on both sides of its plane, {:.1f} to {:.1f} mm in front; move the plane{}",
-          minimum, maximum, wider);
+      return fmt::format(", which lies on both sides of its plane; move the plane{}", wider);
     return fmt::format(
         ", which lies {:.1f} to {:.1f} mm in front of its plane; move the plane along its normal "
-        "by "
-        "more than the one and less than the other{}, or name another bone",
+        "by a distance between the two, or name another bone{}",
         minimum, maximum, wider);
   }
 
@@ -186,10 +183,8 @@ class Sorter {
       base::refuse("{}: the seed of piece '{}', {:g}, is not inside the bone; move it", bone_.name,
                    plan_.piece, seed);
     if (!chosen)
-      base::refuse(
-          "{}: the seed of piece '{}', {:g}, is in a component of the bone that no cut meets; move "
-          "it",
-          bone_.name, plan_.piece, seed);
+      base::refuse("{}: the seed of piece '{}', {:g}, is in a component that no cut meets; move it",
+                   bone_.name, plan_.piece, seed);
     if (parts_[*chosen] == CellPart::kerf)
       base::refuse("{}: the seed of piece '{}', {:g}, is in the kerf; move it", bone_.name,
                    plan_.piece, seed);

@@ -192,6 +192,7 @@ def test_measures_its_error(environment, tmp_path):
                      str(programs()), "-heads", "1", "-output", str(page)], tmp_path, environment, 120)
     assert (result.returncode, result.stderr) == (0, ""), result
     tables = re.findall(r"\*\*all\*\* \| \d+ \| ([\d.]+) \| ([\d.]+) \|", page.read_text())
+    assert len(tables) in (1, 3)  # the real head is there or not
     for (mean, most), limits in zip(tables, ((4, 15), (6, 15), (1, 4))):
         assert float(mean) < limits[0] and float(most) < limits[1], tables
 

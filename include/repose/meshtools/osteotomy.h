@@ -41,11 +41,11 @@ struct Pieces {
 /// that parts nothing of the piece: cuts in front of each other's backs leave no trace. With a seed
 /// and a kerf the whole of each cut is sawn. A shell that no cut meets goes with the part that
 /// contains it, or with the piece where all cuts are planes without a radius and it is in front of
-/// each, or stays. Where a cut runs exactly
-/// through vertices so that parts would touch in a point, it is shifted by some 1e-4 mm. Computed
-/// with exact predicates and constructions, then rounded. Throws InputError naming bone, piece and
-/// remedy: cuts that miss the bone or end inside it, a piece or a rest that comes out empty, a
-/// seed outside the bone or in the kerf, surfaces that intersect themselves where the cut runs.
+/// each, or stays. Where a cut runs exactly through vertices so that parts would touch in a point,
+/// it is shifted by some 1e-4 mm. Computed with exact predicates and constructions, then rounded.
+/// Throws InputError naming bone, piece and remedy: cuts that miss the bone or end inside it, a
+/// piece or a rest that comes out empty, a seed outside the bone or in the kerf, surfaces that
+/// intersect themselves where the cut runs.
 Pieces cut_bone(const Surface& bone, const Osteotomy& plan);
 
 /// A cutting surface from a file (PLY, STL, OBJ, OFF): manifold and oriented, open or closed, of

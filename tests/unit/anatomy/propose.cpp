@@ -83,6 +83,14 @@ TEST(ProposeLandmarks, NoiseOfVerticesHardlyMovesTheRami) {
   }
 }
 
+TEST(ProposeLandmarks, ACondyleThatEndsAtARimIsMissing) {
+  Head head = shipped();
+  std::erase_if(head.mandible.triangles, [&](const Triangle& t) {
+    return std::ranges::any_of(t, [&](int64_t p) { return head.mandible.points[p].z() > -3; });
+  });
+  EXPECT_TRUE(propose(head).missing.contains("condyle_left_center"));
+}
+
 surface::Surface shuffled(const surface::Surface& part, std::mt19937& random) {
   std::vector<int64_t> place(part.points.size());
   std::iota(place.begin(), place.end(), 0);
