@@ -8,18 +8,18 @@ import pathlib
 import numpy as np
 
 from sheet.landmarks import on_surface
+from sheet.published import PUBLISHED
 from sheet.script import reading
 
 NORMS = pathlib.Path(__file__).with_name("norms.json")
 
-# Soft tissue, landmark of bone, direction → published share of the bone's motion in %, along the
-# direction and against it; the sources are in docs/measurements/ratios.md.
-FOLLOWS = {("subnasale", "nasal spine", "forward"): ((38, 90), None),
-           ("upper lip", "upper incisor", "forward"): ((60, 100), None),
-           ("upper lip", "upper incisor", "up"): ((20, 50), None),
-           ("lower lip", "lower incisor", "forward"): ((20, 80), (66, 100)),
-           ("pogonion", "chin bone", "forward"): ((80, 133), (90, 100))}
-CHIN_ALONE = 77, 91  # of a chin that is moved apart from the teeth
+# Soft tissue, landmark of bone, direction → landmark of sheet.published, its operations with a
+# motion along the direction and against it.
+FOLLOWS = {("subnasale", "nasal spine", "forward"): ("subnasale", "Le Fort I", None),
+           ("upper lip", "upper incisor", "forward"): ("upper_lip", "Le Fort I", None),
+           ("upper lip", "upper incisor", "up"): ("upper_lip", "impaction", None),
+           ("lower lip", "lower incisor", "forward"): ("lower_lip", "advance", "set-back"),
+           ("pogonion", "chin bone", "forward"): ("pogonion_soft", "advance", "set-back")}
 FORWARD = 1, -1      # axis of a head, sign
 UP = 2, 1
 LEAST = 1  # mm, of a motion of bone that ratios are given of
@@ -185,7 +185,7 @@ def following(known, bones, result):
     moves by at least a millimeter; the bone nearest to the skin's landmark, where no landmark of it
     is given."""
     found = []
-    for (skin, hard, direction), (along, against) in FOLLOWS.items():
+    for (skin, hard, direction), (landmark, *operations) in FOLLOWS.items():
         if skin not in known:
             continue
         pair, name = bones.get(hard), hard
@@ -197,11 +197,16 @@ def following(known, bones, result):
         soft, bone = motion(known[skin], *way), motion(pair, *way)
         if abs(bone) < LEAST:
             continue
-        published = along if bone > 0 else against
+        published = percent_of(operations[bone < 0], landmark)
         if hard == "chin bone":
             published = published_at_chin(bone, bones.get("lower incisor"), published)
         found.append((skin, name, direction, soft, bone, 100 * soft / bone, published))
     return found
+
+
+def percent_of(operation, landmark):
+    """The published range of an operation, in %; None without one."""
+    return operation and tuple(round(100 * share) for share in PUBLISHED[operation, landmark][1:])
 
 
 def motion(places, axis, sign):
@@ -211,13 +216,13 @@ def motion(places, axis, sign):
 def published_at_chin(bone, incisor, of_jaw):
     """The range of a jaw, of a chin that is moved alone, or of both where it moves with the jaw and
     apart from it, or that is not known."""
-    low, high = CHIN_ALONE
+    low, high = alone = percent_of("chin", "pogonion_soft")
     if incisor is None:
         return min(low, of_jaw[0]), max(high, of_jaw[1])
     with_jaw = motion(incisor, *FORWARD)
     if abs(bone - with_jaw) < LEAST:
         return of_jaw
-    return CHIN_ALONE if abs(with_jaw) < LEAST else (min(low, of_jaw[0]), max(high, of_jaw[1]))
+    return alone if abs(with_jaw) < LEAST else (min(low, of_jaw[0]), max(high, of_jaw[1]))
 
 
 def nearest_bone(point, result):

@@ -6,6 +6,7 @@ import sys
 
 PROJECT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.append(str(PROJECT / "tests/program"))  # where results are read: tissue
+sys.path.append(str(PROJECT / "drivers"))  # what sheets share
 
 
 def option_parser(about, output=None, **settings):

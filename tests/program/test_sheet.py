@@ -24,6 +24,7 @@ from sheet.measures import MEASURES, following, read_norms  # noqa: E402
 from sheet.meshes import coarser  # noqa: E402
 from sheet.page import plan_table  # noqa: E402
 from sheet.profile import middle_plane  # noqa: E402
+from sheet.published import PUBLISHED  # noqa: E402
 from sheet.script import Unusable, own_names  # noqa: E402
 from sheet.shown_skin import Skin, matching_rows, rows_of_patient  # noqa: E402
 from sheet.whole_file import Target  # noqa: E402
@@ -364,10 +365,8 @@ def places(y=0.0, z=0.0):
     ("pogonion", places(y=5), {"chin bone": places(y=5), "lower incisor": places(y=5)},
      ("set-back", "pogonion_soft"))])
 def test_ratios_are_shown_beside_what_is_published_of_their_operation(landmark, skin, bones, key):
-    sys.path.append(str(PROJECT / "tests/benchmark"))
-    published = pytest.importorskip("ratios", reason="no meshio or SciPy").PUBLISHED
     row, = following({landmark: skin}, bones, None)
-    assert [round(share / 100, 2) for share in row[-1]] == list(published[key][1:])
+    assert [round(share / 100, 2) for share in row[-1]] == list(PUBLISHED[key][1:])
 
 
 def test_a_ratio_of_which_nothing_is_published_has_no_range():
