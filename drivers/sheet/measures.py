@@ -22,7 +22,8 @@ FOLLOWS = {("subnasale", "nasal spine", "forward"): ("subnasale", "Le Fort I", N
            ("pogonion", "chin bone", "forward"): ("pogonion_soft", "advance", "set-back")}
 FORWARD = 1, -1      # axis of a head, sign
 UP = 2, 1
-LEAST = 1  # mm, of a motion of bone that ratios are given of
+LEAST = 1    # mm, of a motion of bone that ratios are given of
+ALONG = 0.7  # share of a motion along the direction, from which it is one that is published
 
 
 def read_norms(file):
@@ -183,7 +184,7 @@ def occlusion(known):
 def following(known, bones, result):
     """[(skin, bone, direction, motions in mm of both, share in %, (low, high) or None)] where bone
     moves by at least a millimeter; the bone nearest to the skin's landmark, where no landmark of it
-    is given."""
+    is given. Without a range where bone moves more across than along the direction."""
     found = []
     for (skin, hard, direction), (landmark, *operations) in FOLLOWS.items():
         if skin not in known:
@@ -198,7 +199,9 @@ def following(known, bones, result):
         if abs(bone) < LEAST:
             continue
         published = percent_of(operations[bone < 0], landmark)
-        if hard == "chin bone":
+        if abs(bone) < ALONG * np.linalg.norm(pair[1] - pair[0]):
+            published = None
+        elif hard == "chin bone":
             published = published_at_chin(bone, bones.get("lower incisor"), published)
         found.append((skin, name, direction, soft, bone, 100 * soft / bone, published))
     return found

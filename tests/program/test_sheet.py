@@ -372,3 +372,6 @@ def test_ratios_are_shown_beside_what_is_published_of_their_operation(landmark, 
 def test_a_ratio_of_which_nothing_is_published_has_no_range():
     row, = following({"upper lip": places(z=-1)}, {"upper incisor": places(z=-4)}, None)
     assert row[-1] is None
+    opened = {"lower incisor": places(y=-1.5, z=-11.5), "chin bone": places(y=4, z=-12)}
+    rows = following({"lower lip": places(), "pogonion": places()}, opened, None)
+    assert [row[-1] for row in rows] == [None, None]
