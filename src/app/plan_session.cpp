@@ -3,15 +3,19 @@
 #include <algorithm>
 #include <list>
 
+#include "answer.h"
 #include "given_skin_file.h"
 #include "job.h"
 #include "plan_pieces.h"
+#include "report.h"
 #include "repose/app/settings.h"
 #include "repose/base/agreement.h"
 #include "repose/base/collective.h"
 #include "repose/base/error.h"
 #include "repose/discrete/natural_rows.h"
+#include "repose/model/collision.h"
 #include "repose/model/material.h"
+#include "repose/results/additions.h"
 #include "repose/results/name_lock.h"
 #include "repose/results/result_file.h"
 #include "repose/scene/landmark_names.h"
@@ -29,6 +33,14 @@ struct Base {
   std::vector<double> pressure;
   std::vector<model::PointField> tangents;  // empty: it is no rest position
   std::shared_ptr<const linear::KeptPreconditioner> preconditioner;
+};
+
+/// A solved plan that can be written: this rank's rows.
+struct Solved {
+  PlanSession::Placements plan;
+  model::StepNumbers numbers;
+  model::StepRows rows;
+  solve::Summary summary;
 };
 
 bool same(const PlanSession::Placements& a, const PlanSession::Placements& b) {
@@ -74,14 +86,16 @@ struct PlanSession::State {
   scene::Plan box;
   solve::Settings settings;
   std::list<Base> bases;  // the latest first
-  std::optional<std::pair<model::StepNumbers, model::StepRows>> last;
+  std::optional<Solved> last;
   std::optional<solve::RestSolver> solver;  // once a solve is requested
 
   discrete::Part& part() { return job.local_model.part; }
   void require_inside(const Placements& placements) const;
   void take(const Placements& placements);
+  scene::Scene planned() const;
   std::vector<Vec3> weights(const std::vector<std::pair<int64_t, Vec3>>& functional);
-  solve::Summary search(const solve::Settings& settings, const solve::Start& start);
+  Solved search(const Placements& placements, const solve::Settings& settings,
+                const solve::Start& start);
   Base* base(const Placements& placements, const std::function<bool()>& abandoned);
   void precondition(Base& base);
   solve::Start start_at(const Base& base, const Placements& placements) const;
@@ -104,6 +118,14 @@ void PlanSession::State::take(const Placements& placements) {
     solver->set_motion(piece.bone, scene::motion_of(piece.placement, piece.centroid));
 }
 
+/// The scene with the moves of the plan that was taken last. On rank 0.
+scene::Scene PlanSession::State::planned() const {
+  scene::Scene scene = job.anatomy->scene;
+  for (const solve::PlanPiece& piece : plan)
+    scene.moves[piece.bone] = scene::motion_of(piece.placement, piece.centroid);
+  return scene;
+}
+
 /// This rank's slab of the weights of points, which rank 0 has; empty if there are none.
 std::vector<Vec3> PlanSession::State::weights(
     const std::vector<std::pair<int64_t, Vec3>>& functional) {
@@ -118,10 +140,14 @@ std::vector<Vec3> PlanSession::State::weights(
   return base::scatter(comm, all);
 }
 
-solve::Summary PlanSession::State::search(const solve::Settings& with, const solve::Start& start) {
-  return solver->find(with, start, [&](const auto& numbers, const auto& rows) {
-    last = {numbers, rows};
+Solved PlanSession::State::search(const Placements& placements, const solve::Settings& with,
+                                  const solve::Start& start) {
+  Solved solved{placements, {}, {}, {}};
+  solved.summary = solver->find(with, start, [&](const auto& numbers, const auto& rows) {
+    solved.numbers = numbers;
+    solved.rows = rows;
   });
+  return solved;
 }
 
 /// Solves a base from the initial state, unless it is known; null where that was abandoned.
@@ -138,13 +164,14 @@ Base* PlanSession::State::base(const Placements& placements,
   solve::Settings with = settings;
   with.derivatives.pieces = plan;
   with.abandoned = abandoned;
-  const solve::Summary summary = search(with, {});
-  Base base{placements, last->second.position, {}, {}, {}};
-  for (model::PointField& field : last->second.point_fields) {
+  Solved solved = search(placements, with, {});
+  const solve::PathOutcome& path = solved.summary.path;
+  if (path.last.stopped) return nullptr;
+  Base base{placements, std::move(solved.rows.position), {}, {}, {}};
+  for (model::PointField& field : solved.rows.point_fields) {
     if (field.name == "contact_pressure") base.pressure = field.values;
-    if (is_tangent(field) && summary.path.complete()) base.tangents.push_back(field);
+    if (is_tangent(field) && path.complete()) base.tangents.push_back(std::move(field));
   }
-  if (summary.path.last.stopped) return nullptr;
   bases.push_front(std::move(base));
   if (bases.size() > max_bases) bases.pop_back();
   return &bases.front();
@@ -233,7 +260,6 @@ int64_t PlanSession::points() const { return state_->part().total_points; }
 PlanSession::Answer PlanSession::solve(const Request& request) {
   State& s = *state_;
   s.require_inside(request.plan);
-  auto before = s.last;
   Answer answer;
   solve::Start start;
   if (request.base) {
@@ -250,29 +276,43 @@ PlanSession::Answer PlanSession::solve(const Request& request) {
   with.abandoned = request.abandoned;
   with.derivatives = {s.plan, s.strata, request.tangents, s.weights(request.functional),
                       s.in_region};
-  answer.summary = s.search(with, start);
+  Solved solved = s.search(request.plan, with, start);
+  answer.summary = solved.summary;
+  if (answer.summary.path.last.stopped) return answer;  // an abandoned plan is no answer
   answer.from_base = answer.summary.path.leapt;
-  answer.position = base::gather(s.comm, s.last->second.position);
-  for (const model::PointField& field : s.last->second.point_fields) {
+  answer.position = base::gather(s.comm, solved.rows.position);
+  for (const model::PointField& field : solved.rows.point_fields) {
     answer.field.push_back(field);
     answer.field.back().values = base::gather(s.comm, field.values);
   }
-  if (answer.summary.path.last.stopped)
-    s.last = std::move(before);  // an abandoned plan is no answer
+  s.last = std::move(solved);
   return answer;
 }
 
-void PlanSession::write(const std::filesystem::path& name) {
+std::string PlanSession::write(const std::filesystem::path& name) {
   State& s = *state_;
   if (!s.last) base::refuse("there is no solved plan to write; solve one first");
+  const auto& [plan, numbers, rows, summary] = *s.last;
+  s.take(plan);
   std::optional<results::NameLock> lock;
   base::on_root(s.comm, [&] { lock.emplace(name); });
   results::ResultFile file(s.comm, name, s.job.local_model.global_metadata,
                            discrete::NaturalRows::of_model(s.comm, s.job.local_model));
-  file.append(s.last->first, s.last->second);
+  file.append(numbers, rows);
   file.commit();
+  const std::string result = name.string() + ".h5";
   const SolvedSkin skin(s.comm, s.job);
-  write_given_skin(s.comm, s.job, name.string(), skin, skin.points_at(s.last->second.position));
+  const std::vector<Vec3> now = skin.points_at(rows.position);
+  std::string text = describe_folds(s.comm, result, summary, rows.volume_ratio);
+  const std::string given = write_given_skin(s.comm, s.job, name.string(), skin, now);
+  base::on_root(s.comm, [&] {
+    s.job.move_warnings = model::describe_final_overlaps(s.job.anatomy->bones, s.planned());
+    text = describe_answer(s.job, skin, now, summary, -1) + text +
+           describe_failure(s.job, summary) + describe_touching(s.job, skin, now, summary) +
+           report_row("result", "{}, {}_*.xdmf (ParaView)", result, name.string()) + given;
+    results::add_summary(result, text);
+  });
+  return text;
 }
 
 }  // namespace repose::app

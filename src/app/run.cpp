@@ -12,10 +12,8 @@
 #include <limits>
 #include <optional>
 
-#include "bone_through_skin.h"
+#include "answer.h"
 #include "given_skin_file.h"
-#include "movement.h"
-#include "moving_border.h"
 #include "phase.h"
 #include "plan_pieces.h"
 #include "report.h"
@@ -25,12 +23,10 @@
 #include "repose/base/whole_file.h"
 #include "repose/discrete/natural_rows.h"
 #include "repose/results/additions.h"
-#include "repose/results/model_file.h"
 #include "repose/results/name_lock.h"
 #include "repose/results/restart.h"
 #include "repose/results/result_file.h"
 #include "repose/results/run_files.h"
-#include "repose/scene/landmark_names.h"
 #include "repose/scene/landmarks.h"
 #include "repose/solve/supported.h"
 #include "repose/surface/write.h"
@@ -115,10 +111,7 @@ class Run {
   Coarser solve_coarser();
   solve::Summary search(Writer& writer);
   std::optional<PathCheck> verify(const solve::Summary& summary, const Writer& writer);
-  std::string describe_folds(const model::StepNumbers& last, const Writer& writer) const;
   std::string describe_sensitivity(const solve::Summary& summary, const Writer& writer);
-  std::string describe_answer(const SolvedSkin& skin, const std::vector<Vec3>& now,
-                              const solve::Summary& summary, const Writer& writer) const;
 
   const discrete::Part& part() const { return job_.local_model.part; }
 
@@ -251,16 +244,6 @@ solve::Summary Run::search(Writer& writer) {
   return summary;
 }
 
-/// Describes inverted tissue at the end. Collective.
-std::string Run::describe_folds(const model::StepNumbers& last, const Writer& writer) const {
-  if (last.inverted_prisms == 0) return "";
-  const std::vector<double> ratios = writer.volume_ratios();
-  std::string text;
-  base::on_root(comm,
-                [&] { text = app::describe_folds(results::read_model(name_ + ".h5"), ratios); });
-  return text;
-}
-
 /// Solves what came to rest again, in twice the load steps, where that is requested. Collective.
 std::optional<PathCheck> Run::verify(const solve::Summary& summary, const Writer& writer) {
   if (!strategy_.verifies_path || !summary.path.complete()) return {};
@@ -282,22 +265,6 @@ std::string Run::describe_sensitivity(const solve::Summary& summary, const Write
   return describe_sensitivities(found);
 }
 
-/// First lines of the end-of-run summary: movement of the face, its accuracy, and warnings. `now`
-/// are the points of the skin. On rank 0.
-std::string Run::describe_answer(const SolvedSkin& skin, const std::vector<Vec3>& now,
-                                 const solve::Summary& summary, const Writer& writer) const {
-  std::vector<model::FacePlace> places;
-  if (job_.anatomy) places = model::face_places(*job_.anatomy);
-  const surface::Surface& before = skin.initial();
-  const Mat3 axes =
-      scene::head_axes(job_.anatomy ? job_.anatomy->scene.landmarks : scene::Landmarks());
-  std::string text = describe_movement(places, axes, before, now) + " ";
-  if (job_.anatomy)
-    text += describe_lips(job_.anatomy->scene.landmarks, axes.row(2), before.points, now);
-  return text + describe_trust(summary, writer.discretization_error()) + "\n" +
-         describe_warnings(job_.warnings);
-}
-
 base::Exit Run::solve() {
   const solve::Tearing tearing = tear();
   const Coarser coarser = solve_coarser();
@@ -308,32 +275,25 @@ base::Exit Run::solve() {
   const solve::Summary summary = search(writer);
   writer.commit();
   const bool folded = summary.last.inverted_prisms > 0 && !folds_allowed_;
-  const std::string folds = folded ? describe_folds(summary.last, writer) : "";
+  const std::string folds =
+      folded ? describe_folds(comm, name_ + ".h5", summary, writer.volume_ratio()) : "";
   const std::vector<Vec3> now = skin.points_at(writer.slab());
   const std::string given = write_given_skin(comm, job_, name_, skin, now);
   stages_.end("write");
   const std::optional<PathCheck> path = verify(summary, writer);
   const std::string sensitivity = describe_sensitivity(summary, writer);
-  std::string answer, skin_report;
+  std::string answer, touching;
   base::on_root(comm, [&] {
-    answer = describe_answer(skin, now, summary, writer);
-    if (summary.path.complete())
-      skin_report =
-          describe_bone_through_skin(skin.initial(), now, job_.local_model.global_metadata) +
-          (job_.anatomy ? describe_moving_border(skin.initial(), now) : "") +
-          skin.describe_self_contact(now);
+    answer = describe_answer(job_, skin, now, summary, writer.discretization_error());
+    touching = describe_touching(job_, skin, now, summary);
   });
-  const std::string text =
-      answer + folds +
-      describe_failure(summary, job_.reference_state.has_value(),
-                       job_.local_model.global_metadata.adhesion.has_value(),
-                       solve::given_search_options()) +
-      describe_run(summary, strategy_.settings, base::size(comm), stages_) + coarser.report +
-      writer.comparison() + sensitivity + describe_tearing(tearing) +
-      describe_tangents(writer.point_fields()) + (path ? describe_path(*path) : "") +
-      writer.reactions() + describe_contact(job_.bodies, summary) +
-      describe_pierced(job_.bodies, summary) + skin_report +
-      report_row("result", "{}.h5, {}_*.xdmf (ParaView)", name_, name_) + given;
+  const std::string text = answer + folds + describe_failure(job_, summary) +
+                           describe_run(summary, strategy_.settings, base::size(comm), stages_) +
+                           coarser.report + writer.comparison() + sensitivity +
+                           describe_tearing(tearing) + describe_tangents(writer.point_fields()) +
+                           (path ? describe_path(*path) : "") + writer.reactions() + touching +
+                           report_row("result", "{}.h5, {}_*.xdmf (ParaView)", name_, name_) +
+                           given;
   print(text);
   base::on_root(comm, [&] { results::add_summary(name_ + ".h5", text); });
   const bool holds = summary.path.complete() && !folded && (!path || path->holds());
@@ -376,7 +336,7 @@ std::pair<Job, Strategy> prepare(const base::Options& options, const std::filesy
   stages.end("build");
   if (base::rank(comm) == 0)
     print(job.building + describe_model(job.local_model.counts) + describe_warnings(job.warnings) +
-          strategy.explanation);
+          describe_warnings(job.move_warnings) + strategy.explanation);
   return {std::move(job), std::move(strategy)};
 }
 

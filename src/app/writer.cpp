@@ -61,10 +61,6 @@ void Writer::on_iterate(double load, const solve::StateSnapshot& snapshot) {
 
 std::vector<Vec3> Writer::positions() const { return base::gather(comm_, last_.rows.position); }
 
-std::vector<double> Writer::volume_ratios() const {
-  return base::gather(comm_, last_.rows.volume_ratio);
-}
-
 std::vector<double> Writer::contact_pressures() const {
   for (const model::PointField& field : last_.rows.point_fields)
     if (field.name == "contact_pressure") return base::gather(comm_, field.values);

@@ -47,11 +47,11 @@ class Writer {
     const double error = last_.numbers.discretization_error;
     return std::isnan(error) ? -1 : error;
   }
-  /// This rank's slab of the positions at the last step.
+  /// This rank's slabs of the positions and volume ratios at the last step.
   const std::vector<Vec3>& slab() const { return last_.rows.position; }
-  /// [N] and [prisms] of the last step, on rank 0.
+  const std::vector<double>& volume_ratio() const { return last_.rows.volume_ratio; }
+  /// [N] of the last step, on rank 0.
   std::vector<Vec3> positions() const;
-  std::vector<double> volume_ratios() const;
   /// [N] N/mm², or nothing where tissue touches nothing; likewise.
   std::vector<double> contact_pressures() const;
   /// This rank's rows of what else is known of the points at the last step.

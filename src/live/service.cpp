@@ -105,7 +105,7 @@ void Service::dispatch(const Request& request, Reply& reply) {
   if (request.verb == Verb::change) change(request.changes);
   if (request.verb == Verb::describe || request.verb == Verb::change) describe(reply);
   if (request.verb == Verb::solve) solve(request, reply);
-  if (request.verb == Verb::write) session_->write(request.output);
+  if (request.verb == Verb::write) reply.head()["summary"] = session_->write(request.output);
 }
 
 /// Builds the scene with changes in place of those before. Where it cannot be, it stays as it is.

@@ -203,26 +203,39 @@ std::vector<Mover> movers_of(const std::vector<surface::Surface>& bones,
   return movers;
 }
 
-/// Warns of bones that lie inside others before all moves and, if requested, at their end.
-void report_overlaps(std::vector<Mover>& movers, const scene::Scene& scene, bool at_end,
-                     std::vector<std::string>& warnings) {
-  constexpr double initial_limit = 2, final_limit = 1;  // mm: segmented teeth overlap by tenths
-  for (size_t i = 0; i < movers.size(); ++i)
-    for (size_t j = i + 1; j < movers.size(); ++j) {
-      const std::string pair =
-          fmt::format("bones '{}' and '{}'", scene.bones[i].name, scene.bones[j].name);
-      if (const double depth = overlap(movers[i], movers[j], 0).depth; depth > initial_limit)
-        warnings.push_back(fmt::format(
-            "{} lie {:.1f} mm inside one another before they move: check that both come from one "
-            "scan and in one frame, or separate their segmentations",
-            pair, depth));
-      if (!at_end || move_alike(movers[i].motion, movers[j].motion)) continue;
-      if (const double depth = overlap(movers[i], movers[j], 1).depth; depth > final_limit)
-        warnings.push_back(fmt::format(
-            "{} end {:.1f} mm inside one another; repose-collide reports where they meet, and "
-            "collision: {{mode: clamp}} moves them no farther",
-            pair, depth));
-    }
+/// Calls visit(i, j, "bones 'NAME' and 'NAME'") for all pairs.
+template <class Visit>
+void for_each_pair(const scene::Scene& scene, Visit&& visit) {
+  for (size_t i = 0; i < scene.bones.size(); ++i)
+    for (size_t j = i + 1; j < scene.bones.size(); ++j)
+      visit(i, j, fmt::format("bones '{}' and '{}'", scene.bones[i].name, scene.bones[j].name));
+}
+
+/// Warns of bones that lie inside others before all moves.
+void report_initial_overlaps(std::vector<Mover>& movers, const scene::Scene& scene,
+                             std::vector<std::string>& warnings) {
+  constexpr double limit = 2;  // mm: segmented teeth overlap by tenths
+  for_each_pair(scene, [&](size_t i, size_t j, const std::string& pair) {
+    if (const double depth = overlap(movers[i], movers[j], 0).depth; depth > limit)
+      warnings.push_back(fmt::format(
+          "{} lie {:.1f} mm inside one another before they move: check that both come from one "
+          "scan and in one frame, or separate their segmentations",
+          pair, depth));
+  });
+}
+
+/// Warns of bones that move differently and end inside one another.
+void report_final_overlaps(std::vector<Mover>& movers, const scene::Scene& scene,
+                           std::vector<std::string>& warnings) {
+  constexpr double limit = 1;  // mm
+  for_each_pair(scene, [&](size_t i, size_t j, const std::string& pair) {
+    if (move_alike(movers[i].motion, movers[j].motion)) return;
+    if (const double depth = overlap(movers[i], movers[j], 1).depth; depth > limit)
+      warnings.push_back(fmt::format(
+          "{} end {:.1f} mm inside one another; repose-collide reports where they meet, and "
+          "collision: {{mode: clamp}} moves them no farther",
+          pair, depth));
+  });
 }
 
 /// Follows all pairs that move differently.
@@ -291,12 +304,22 @@ std::vector<std::string> describe(const CollisionReport& report, const scene::Sc
   return lines;
 }
 
+std::vector<std::string> describe_final_overlaps(const std::vector<surface::Surface>& bones,
+                                                 const scene::Scene& scene) {
+  std::vector<Mover> movers = movers_of(bones, scene.moves);
+  std::vector<std::string> lines;
+  report_final_overlaps(movers, scene, lines);
+  return lines;
+}
+
 void resolve_collisions(const std::vector<surface::Surface>& bones, scene::Scene& scene,
-                        std::vector<std::string>& remarks, std::vector<std::string>& warnings) {
+                        std::vector<std::string>& remarks, std::vector<std::string>& warnings,
+                        std::vector<std::string>& move_warnings) {
   using Mode = scene::CollisionMode;
   std::vector<Mover> movers = movers_of(bones, scene.moves);
-  report_overlaps(movers, scene, !scene.collision || scene.collision->mode == Mode::report,
-                  warnings);
+  report_initial_overlaps(movers, scene, warnings);
+  if (!scene.collision || scene.collision->mode == Mode::report)
+    report_final_overlaps(movers, scene, move_warnings);
   if (!scene.collision) return;
   const CollisionReport report = follow_all(movers, *scene.collision);
   const std::vector<std::string> lines = describe(report, scene, *scene.collision);
@@ -311,7 +334,7 @@ void resolve_collisions(const std::vector<surface::Surface>& bones, scene::Scene
   }
   for (scene::RigidMotion& move : scene.moves)
     move = scene::RigidMotion::from_matrix(move.matrix(report.safe_load));
-  warnings.push_back(fmt::format(
+  move_warnings.push_back(fmt::format(
       "all moves end at load {:.4f} of the plan, before the first contact", report.safe_load));
 }
 

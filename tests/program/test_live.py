@@ -206,6 +206,37 @@ def test_a_full_result_passes_the_check(session, run, tmp_path):
     assert mesh.points.shape == session.initial.shape
 
 
+def test_a_full_result_holds_a_summary_of_its_own_plan(session, tmp_path):
+    session.solve({"chin": {"translate": [0, 0, 6]}})
+    rows = session.write(tmp_path / "deep").splitlines()
+    told = [row.split(maxsplit=1) for row in rows]
+    assert any(row[0] == "warning" and "'mandible' and 'chin' end" in row[1] for row in told), rows
+    assert any(row[0] == "contact" for row in told), rows
+    with h5py.File(tmp_path / "deep.h5") as h5:
+        assert [row.decode() for row in h5["summary"][()]] == rows
+    session.solve(B)
+    assert "inside one another" not in session.write(tmp_path / "plan")
+
+
+def test_the_result_of_a_plan_has_its_own_bones_after_one_that_was_abandoned(session, run, tmp_path):
+    session.solve(B)
+    session.write(tmp_path / "before")
+
+    def slow():
+        with pytest.raises(repose.Refused, match="overtook"):
+            session.solve(A, accuracy=1e-6, base="rest")
+    thread = threading.Thread(target=slow)
+    thread.start()
+    time.sleep(0.2)
+    with pytest.raises(repose.Refused, match="-50"):
+        session.solve({"chin": {"translate": [0, -50, 0]}})
+    thread.join()
+    session.write(tmp_path / "after")
+    with h5py.File(tmp_path / "before.h5") as before, h5py.File(tmp_path / "after.h5") as after:
+        for name in ("bone_transform", "point/target"):
+            assert np.array_equal(before["model"][name], after["model"][name]), name
+
+
 def test_a_full_result_holds_the_given_skin(tmp_path):
     text = SCENE.read_text().replace(": head_", f": {SCENE.parent}/head_").replace("  layers: 4", "  layers: 2\n  edge: 8")
     (tmp_path / "plan.yaml").write_text(text)

@@ -300,8 +300,10 @@ class Session:
         return self.ask({"do": "describe"})
 
     def write(self, output):
-        """Writes the last answer as a full result OUTPUT.h5 with its XDMF files."""
-        self.ask({"do": "write", "output": str(pathlib.Path(output).resolve())})
+        """Writes the last answer as a full result OUTPUT.h5 with its XDMF files. Returns the summary that it
+        holds, a text."""
+        head, _ = self.ask({"do": "write", "output": str(pathlib.Path(output).resolve())})
+        return head["summary"]
 
     def close(self):
         """Ends repose-live, and a verification under way."""

@@ -64,8 +64,9 @@ class PlanSession {
 
   /// Throws InputError where the plan is outside the box.
   Answer solve(const Request& request);
-  /// Writes the last answer as NAME.h5 with its XDMF files. Throws InputError without one.
-  void write(const std::filesystem::path& name);
+  /// Writes the last answer as NAME.h5 with its XDMF files. Returns the summary that it holds, of
+  /// the face and what it touches. Throws InputError without an answer.
+  std::string write(const std::filesystem::path& name);
 
  private:
   struct State;

@@ -43,9 +43,10 @@ struct Anatomy {
   surface::Surface skin;  ///< that is solved
   /// The skin that the scene names, where another is solved in its place (solved_skin.h).
   std::optional<surface::Surface> given_skin;
-  std::vector<surface::Surface> bones;  ///< [scene.bones]
-  std::vector<std::string> remarks;     ///< lines for a person, each complete
-  std::vector<std::string> warnings;    ///< implausible properties, a line each
+  std::vector<surface::Surface> bones;          ///< [scene.bones]
+  std::vector<std::string> remarks;             ///< lines for a person, each complete
+  std::vector<std::string> warnings;            ///< implausible properties, a line each
+  std::vector<std::string> move_warnings = {};  ///< likewise, of where the scene's moves end
 };
 
 /// Reads the scene's surfaces, cuts its bones and resolves collisions. Serial.

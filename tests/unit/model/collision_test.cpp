@@ -126,7 +126,7 @@ TEST(Collisions, a_bone_inside_another_overlaps_it) {
     for (const std::vector<surface::Surface>& bones : {std::vector{outer, bone}, {bone, outer}}) {
       scene::Scene scene = scene_of(bones, moves);
       std::vector<std::string> remarks, warnings;
-      resolve_collisions(bones, scene, remarks, warnings);
+      resolve_collisions(bones, scene, remarks, warnings, warnings);
       ASSERT_EQ(warnings.size(), 2u);
       EXPECT_NE(warnings[0].find("lie 10.0 mm inside one another before they move"),
                 std::string::npos)
@@ -167,7 +167,7 @@ TEST(Collisions, clamp_shortens_all_moves_alike) {
       scene_of(jaws, {RigidMotion::translation({4, 0, 0}), RigidMotion::translation({0, 0, 20})});
   scene.collision = scene::Collision{scene::CollisionMode::clamp, 0.5, 0.01};
   std::vector<std::string> remarks, warnings;
-  resolve_collisions(jaws, scene, remarks, warnings);
+  resolve_collisions(jaws, scene, remarks, warnings, warnings);
   const Vec3 lower = scene.moves[1].apply(Vec3::Zero()), upper = scene.moves[0].apply(Vec3::Zero());
   EXPECT_LE(lower.z(), 9.5);
   EXPECT_GE(lower.z(), 9.49 - 1e-3);
@@ -180,18 +180,18 @@ TEST(Collisions, clamp_shortens_all_moves_alike) {
 TEST(Collisions, report_and_none_change_nothing) {
   scene::Scene scene = scene_of(jaws, {{}, RigidMotion::translation({8, 0, 20})});
   std::vector<std::string> remarks, warnings;
-  resolve_collisions(jaws, scene, remarks, warnings);
+  resolve_collisions(jaws, scene, remarks, warnings, warnings);
   ASSERT_EQ(warnings.size(), 1u);
   const std::string overlap = "bones 'upper' and 'lower' end 10.0 mm inside one another";
   EXPECT_EQ(warnings[0].find(overlap), 0u) << warnings[0];
   scene.moves[1] = RigidMotion::translation({8, 0, 10.9});
   warnings.clear();
-  resolve_collisions(jaws, scene, remarks, warnings);
+  resolve_collisions(jaws, scene, remarks, warnings, warnings);
   EXPECT_TRUE(warnings.empty());
   EXPECT_TRUE(remarks.empty());
   scene.moves[1] = RigidMotion::translation({8, 0, 20});
   scene.collision = scene::Collision{};
-  resolve_collisions(jaws, scene, remarks, warnings);
+  resolve_collisions(jaws, scene, remarks, warnings, warnings);
   ASSERT_EQ(warnings.size(), 1u);
   EXPECT_EQ(warnings[0].find(overlap), 0u) << warnings[0];
   EXPECT_EQ(scene.moves[1].apply(Vec3::Zero()).z(), 20);
@@ -218,7 +218,7 @@ TEST(Collisions, stop_refuses_the_scene) {
   scene.collision = scene::Collision{scene::CollisionMode::stop, 0, 0.05};
   std::vector<std::string> remarks, warnings;
   try {
-    resolve_collisions(jaws, scene, remarks, warnings);
+    resolve_collisions(jaws, scene, remarks, warnings, warnings);
     FAIL() << "accepted";
   } catch (const base::InputError& error) {
     const std::string why = error.what();
@@ -226,7 +226,7 @@ TEST(Collisions, stop_refuses_the_scene) {
     EXPECT_EQ(why.find('\n'), std::string::npos);
   }
   scene.moves[1] = RigidMotion::translation({0, 0, 5});
-  resolve_collisions(jaws, scene, remarks, warnings);
+  resolve_collisions(jaws, scene, remarks, warnings, warnings);
 }
 
 }  // namespace collision_test

@@ -1,0 +1,55 @@
+#include "answer.h"
+
+#include "bone_through_skin.h"
+#include "movement.h"
+#include "moving_border.h"
+#include "report.h"
+#include "repose/base/agreement.h"
+#include "repose/base/collective.h"
+#include "repose/results/model_file.h"
+#include "repose/scene/landmark_names.h"
+#include "repose/solve/supported.h"
+
+namespace repose::app {
+
+std::string describe_answer(const Job& job, const SolvedSkin& skin, const std::vector<Vec3>& now,
+                            const solve::Summary& summary, double discretization) {
+  std::vector<model::FacePlace> places;
+  scene::Landmarks landmarks;
+  if (job.anatomy) {
+    places = model::face_places(*job.anatomy);
+    landmarks = job.anatomy->scene.landmarks;
+  }
+  const surface::Surface& before = skin.initial();
+  const Mat3 axes = scene::head_axes(landmarks);
+  return describe_movement(places, axes, before, now) + " " +
+         describe_lips(landmarks, axes.row(2), before.points, now) +
+         describe_trust(summary, discretization) + "\n" + describe_warnings(job.warnings) +
+         describe_warnings(job.move_warnings);
+}
+
+std::string describe_folds(MPI_Comm comm, const std::filesystem::path& file,
+                           const solve::Summary& summary, const std::vector<double>& volume_ratio) {
+  if (summary.last.inverted_prisms == 0) return "";
+  const std::vector<double> ratios = base::gather(comm, volume_ratio);
+  std::string text;
+  base::on_root(comm, [&] { text = describe_folds(results::read_model(file), ratios); });
+  return text;
+}
+
+std::string describe_touching(const Job& job, const SolvedSkin& skin, const std::vector<Vec3>& now,
+                              const solve::Summary& summary) {
+  std::string text = describe_contact(job.bodies, summary) + describe_pierced(job.bodies, summary);
+  if (!summary.path.complete()) return text;
+  text += describe_bone_through_skin(skin.initial(), now, job.local_model.global_metadata);
+  if (job.anatomy) text += describe_moving_border(skin.initial(), now);
+  return text + skin.describe_self_contact(now);
+}
+
+std::string describe_failure(const Job& job, const solve::Summary& summary) {
+  return describe_failure(summary, job.reference_state.has_value(),
+                          job.local_model.global_metadata.adhesion.has_value(),
+                          solve::given_search_options());
+}
+
+}  // namespace repose::app
