@@ -63,16 +63,18 @@ double elongation_at(const model::Springs& springs, size_t j, double tension) {
   });
 }
 
-/// Removes contact: tensions balance the forces on points that slide, too, and bodies carry none.
-void remove_contact(discrete::Part& part) {
+/// Removes what is not tissue: its tensions balance the forces on points that slide, too, and
+/// neither bodies nor further terms carry any.
+void keep_tissue_alone(discrete::Part& part) {
   part.contact = false;
   part.model.contact = {};
+  part.model.elements.clear();
 }
 
 /// Linear springs at rest between the points of `part` and, of a solid, prisms at rest. At the
 /// initial position the Hessian of their energy is A K Aᵀ.
 discrete::Part stiffness_part(discrete::Part part, const std::vector<char>& skin) {
-  remove_contact(part);
+  keep_tissue_alone(part);
   Model& model = part.model;
   model.prisms = {};
   part.owned_prisms = part.total_prisms = 0;
@@ -88,7 +90,7 @@ discrete::Part stiffness_part(discrete::Part part, const std::vector<char>& skin
 /// in place of its edges, prisms of modulus K that are at rest.
 discrete::Part solid_stiffness_part(discrete::Part part) {
   constexpr double pairs = 15;
-  remove_contact(part);
+  keep_tissue_alone(part);
   Model& model = part.model;
   model::Springs& springs = model.springs;
   std::map<std::array<int64_t, 2>, double> share;  // Σ E V / 15, N·mm

@@ -80,6 +80,12 @@ def pytest_sessionfinish(session, exitstatus):
         session.exitstatus = pytest.ExitCode.OK
 
 
+def some_on_ranks(cases, ranks, every=4):
+    """Parameters (case, ranks): each case on one rank; on `ranks` all of them in the long run, else every fourth."""
+    return [pytest.param(case, count, marks=[] if count == 1 or k % every == 0 else pytest.mark.long)
+            for k, case in enumerate(cases) for count in (1, ranks)]
+
+
 @pytest.fixture(scope="session")
 def environment():
     return mpi_environment()

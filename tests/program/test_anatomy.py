@@ -112,8 +112,9 @@ def test_the_answer_is_along_the_head_without_anatomy(run, tmp_path, right, left
 
 
 @pytest.mark.parametrize("template, move", [
-    pytest.param("le_fort_1", "advance: 4, impaction: 2, yaw: 2", marks=pytest.mark.long),
-    ("genioplasty", "advance: 6"), ("sagittal_split", "set_back: 5")])
+    *(pytest.param(*more, marks=pytest.mark.long)
+      for more in (("le_fort_1", "advance: 4, impaction: 2, yaw: 2"), ("genioplasty", "advance: 6"))),
+    ("sagittal_split", "set_back: 5")])
 @pytest.mark.parametrize("head", ["head"], indirect=True)
 def test_plan_and_face_turn_with_the_head(run, tmp_path, head, template, move):
     """On the given mesh, which turns with the head: a remeshed skin is another one in another pose."""
@@ -214,6 +215,16 @@ def test_the_lower_lip_adheres_to_its_teeth_in_a_set_back(run, tmp_path, head):
     assert lips["on", "lower_lip"] > lips["off", "lower_lip"] + 0.05
     assert abs(lips["on", "upper_lip"] - lips["off", "upper_lip"]) < 0.05
     assert abs(lips["on", "lower_lip"] - lips["shared", "lower_lip"]) < 0.005
+
+
+@pytest.mark.parametrize("head", ["head"], indirect=True)
+def test_tissue_whose_lips_adhere_is_balanced_under_tension(run, tmp_path, head):
+    write_scene(tmp_path, "gravity: [0, 0, -9.81]\nmoves: [{bone: mandible, clinical: {advance: 0.01}}]\n",
+                tissue="layers: 3, edge: 8, material: {preset: skin_on_fat}, turgor: 0.04, density: 1e-6")
+    result = run("repose-solve", "scene.yaml", "-output", "face", "-skip_other_rest")
+    assert (result.returncode, result.stderr) == (0, ""), result
+    assert "points of the lips adhere to teeth" in result.stdout
+    assert np.linalg.norm(last(tmp_path / "face.h5")["point/displacement"], axis=1).max() < 0.05
 
 
 @pytest.mark.parametrize("head", ["head"], indirect=True)
