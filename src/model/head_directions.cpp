@@ -1,5 +1,6 @@
 #include "head_directions.h"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cctype>
@@ -12,8 +13,9 @@
 namespace repose::model {
 namespace {
 
-constexpr double open_share = 0.2;     // of a skin's area: its mean normal, where it is a patch
-constexpr double near_middle = 12;     // mm
+constexpr double open_share = 0.2;  // of a skin's area: its mean normal, where it is a patch
+constexpr double sideways = 0.6;    // of the skin's mean normal along the jaw's width: of a cheek
+constexpr double near_middle = 12;  // mm
 constexpr double front_of_jaw = 0.25;  // of its extent
 
 bool holds_any(const std::string& name, std::initializer_list<std::string_view> words) {
@@ -46,6 +48,51 @@ void align_with_axes(HeadDirections& frame) {
       frame.forward = forward;
     }
   frame.left = frame.up.cross(frame.forward);
+}
+
+/// The direction in which points lie farthest from their mean: of a jaw from side to side.
+Vec3 widest_direction(const std::vector<Vec3>& points) {
+  Vec3 mean = Vec3::Zero();
+  for (const Vec3& x : points) mean += x / static_cast<double>(points.size());
+  Mat3 scatter = Mat3::Zero();
+  for (const Vec3& x : points) scatter += (x - mean) * (x - mean).transpose();
+  return Eigen::SelfAdjointEigenSolver<Mat3>(scatter).eigenvectors().col(2);
+}
+
+/// Returns where a patch of skin faces, `outward` or the other way; nothing if it is of a cheek.
+std::optional<Vec3> facing_of_patch(const SkinMesh& mesh, const Vec3& outward,
+                                    const BoneGroup& upper, const BoneGroup& lower) {
+  Vec3 skin = Vec3::Zero();
+  for (const Vec3& x : mesh.points) skin += x / static_cast<double>(mesh.points.size());
+  const Vec3 bones = (upper.box.center() + lower.box.center()) / 2, facing = outward.normalized();
+  const bool named_wrongly = upper.box.volume() < lower.box.volume();  // a jaw is the smaller one
+  const BoneGroup& jaw = named_wrongly ? upper : lower;
+  if (std::abs(facing.dot(widest_direction(jaw.points))) > sideways) return {};
+  return facing.dot(skin - bones) < 0 ? Vec3(-facing) : facing;
+}
+
+/// Returns where a head with a closed skin faces: across the jaw's width and the way up to the
+/// skull. Behind the jaw's middle are its highest points, of the rami, and along the nearest axis
+/// of the coordinates the skull's middle; nothing if these are on different sides.
+std::optional<Vec3> facing_of_bones(const BoneGroup& upper, const BoneGroup& lower) {
+  constexpr double rami = 0.1, behind = 5;  // of the jaw's points; mm
+  const Vec3 to_skull = upper.box.center() - lower.box.center(), up = to_skull.normalized();
+  Vec3 facing = widest_direction(lower.points).cross(up).normalized();
+  std::vector<Vec3> jaw = lower.points;
+  std::ranges::sort(jaw, std::ranges::greater(), [&](const Vec3& x) { return up.dot(x); });
+  const auto highest = static_cast<size_t>(std::ceil(rami * static_cast<double>(jaw.size())));
+  const auto mean_along = [&](size_t count) {
+    double sum = 0;
+    for (size_t i = 0; i < count; ++i) sum += facing.dot(jaw[i]);
+    return sum / static_cast<double>(count);
+  };
+  const double ahead = mean_along(highest) - mean_along(jaw.size());
+  if (ahead > 0) facing = -facing;
+  Eigen::Index axis = 0;
+  facing.cwiseAbs().maxCoeff(&axis);
+  if (std::abs(ahead) < behind || to_skull[axis] * std::copysign(1, facing[axis]) > -behind)
+    return {};
+  return facing;
 }
 
 template <class Keep>
@@ -84,13 +131,12 @@ std::optional<HeadDirections> head_directions(const SkinMesh& mesh, const BoneGr
     outward -= normal;
     area += normal.norm();
   }
-  if (outward.norm() < open_share * area) return {};
-  Vec3 skin = Vec3::Zero();
-  for (const Vec3& x : mesh.points) skin += x / static_cast<double>(mesh.points.size());
-  const Vec3 bones = (upper.box.center() + lower.box.center()) / 2;
+  const bool patch = outward.norm() >= open_share * area;
+  const auto facing =
+      patch ? facing_of_patch(mesh, outward, upper, lower) : facing_of_bones(upper, lower);
+  if (!facing) return {};
   HeadDirections frame;
-  frame.facing = outward.normalized();
-  if (frame.facing.dot(skin - bones) < 0) frame.facing = -frame.facing;
+  frame.facing = *facing;
   const Vec3 up = upper.box.center() - lower.box.center();
   const Vec3 across = up - up.dot(frame.facing) * frame.facing;
   if (across.norm() < 1e-3 * up.norm()) return {};

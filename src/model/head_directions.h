@@ -33,7 +33,8 @@ struct HeadDirections {
 };
 
 /// Returns the directions of a head: up from the lower to the upper bones, forward where the skin
-/// faces. Empty where the skin is closed, or one of the groups is missing.
+/// faces or, if it is closed, the jaw. Empty where the skin is of one side of the face, where jaw
+/// and skull do not say which side is the front, and where one of the groups is missing.
 std::optional<HeadDirections> head_directions(const SkinMesh& mesh, const BoneGroup& upper,
                                               const BoneGroup& lower);
 

@@ -188,6 +188,14 @@ def test_no_false_alarm_on_the_real_head(run, tmp_path, scene):
     assert all("lips are one skin" in line for line in found)
 
 
+def test_no_false_alarm_on_the_skin_of_a_cheek(run, tmp_path):
+    tissue = "layers: 3, edge: 5, material: {preset: skin_on_fat}, turgor: 0.05"
+    scene = Head(tmp_path).scene(SCENE.partition("moves")[0].replace("layers: 3", tissue) +
+                                 "incisions: [{path: [[47, -80, 8], [49, -75, -8], [46.5, -70, -24]], layers: 2}]\n")
+    result = run("repose-solve", scene, "-dry_run", cwd=tmp_path)
+    assert result.returncode == 0 and not any("one scan" in line for line in warnings_of(result)), result
+
+
 @pytest.mark.skipif(not DATA.is_dir(), reason=f"no real head: {DATA} is missing")
 def test_the_jaw_of_another_patient_is_reported(run, tmp_path):
     for part in ("skin", "skull"):
