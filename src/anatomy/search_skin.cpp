@@ -187,7 +187,7 @@ void search_skin(const surface::Surface& skin, Search& search) {
 
 std::vector<Vec3> find_lip_crease(const surface::Surface& skin, const HeadFrame& frame,
                                   const Landmarks& landmarks) {
-  constexpr double apart = 2;  // mm
+  constexpr double apart = 2, rounding = 1e-6;  // mm; from the middle, so that sides are alike
   Search search(frame, landmarks);
   const FrontMap map(skin, frame);
   const auto right = search.find("mouth_right"), left = search.find("mouth_left"),
@@ -201,10 +201,16 @@ std::vector<Vec3> find_lip_crease(const surface::Surface& skin, const HeadFrame&
     z = crease_height(map, edge->z());
   if (!z) return {};
   const LipCrease crease = follow_crease(map, *z, right, left);
+  const std::vector<Vec3>& points = crease.points;
   std::vector<Vec3> path;
-  for (const Vec3& p : crease.points)
-    if (path.empty() || p.x() - frame.to_frame(path.back()).x() >= apart)
-      path.push_back(frame.to_scan(p));
+  for (size_t i = 0; i < points.size(); ++i) {
+    const bool end = i == 0 || i + 1 == points.size();
+    const double from_end =
+        std::min(points[i].x() - points.front().x(), points.back().x() - points[i].x());
+    const double steps = points[i].x() / apart;
+    if (end || (from_end > apart / 2 && std::abs(steps - std::round(steps)) < rounding))
+      path.push_back(frame.to_scan(points[i]));
+  }
   return path;
 }
 

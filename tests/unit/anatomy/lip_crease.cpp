@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include "repose/anatomy/propose.h"
+
 namespace repose::anatomy {
 namespace {
 
@@ -69,6 +71,22 @@ TEST(LipCrease, ASideOnWhichItIsLostIsFollowedAsFarAsTheOther) {
   EXPECT_NEAR((*crease.lost)[1], 24, 1);
   EXPECT_NEAR(crease.points.front().x(), -crease.points.back().x(), 1);
   EXPECT_FALSE(follow_crease(map, -3, Vec3(-20, 0, -3), Vec3(20, 0, -3)).lost);
+}
+
+TEST(LipCrease, AMirroredFaceHasAMirroredPath) {
+  surface::Surface skin;
+  add(skin, 0, {-50, -2}, {50, 40});
+  add(skin, 0, {-50, -60}, {50, -4});
+  add(skin, 3, {-50, -4}, {50, -2});
+  const auto path = [&](double right, double left) {
+    return find_lip_crease(skin, HeadFrame{},
+                           {{"mouth_right", {right, 0, -3}}, {"mouth_left", {left, 0, -3}}});
+  };
+  const std::vector<Vec3> there = path(-23.2, 21.7), mirrored = path(-21.7, 23.2);
+  ASSERT_GT(there.size(), 20u);
+  ASSERT_EQ(there.size(), mirrored.size());
+  for (size_t i = 0; i < there.size(); ++i)
+    EXPECT_NEAR(there[i].x(), -mirrored[there.size() - 1 - i].x(), 1e-9);
 }
 
 TEST(LipCrease, ASideThatRunsOnEndsWhereACornerOfTheMouthCanBe) {
