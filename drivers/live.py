@@ -17,6 +17,7 @@ import secrets
 import signal
 import subprocess
 import sys
+import threading
 import urllib.parse
 import webbrowser
 
@@ -197,16 +198,22 @@ class Handler(http.server.BaseHTTPRequestHandler):
         return scene_with_moves(self.server.scene, request["moves"]).encode()
 
     def result(self, request):
-        self.server.session.ask({"do": "solve", "plan": request["plan"]})
-        output = self.server.scene.with_name(self.server.scene.stem + "_plan")
-        self.server.session.write(output)
-        return f"{output}.h5".encode()
+        with self.server.writing:
+            return self.write(request["plan"])[1].encode()
+
+    def write(self, plan):
+        """Writes the result of a plan: its path without ending, and what the page says of it."""
+        name = self.server.scene.with_name(self.server.scene.stem + "_plan")
+        count = sum(line.startswith(("NOT", "FOLDED")) or line.split()[:1] == ["warning"]
+                    for line in self.server.session.write(name, plan).splitlines())
+        return name, f"{name}.h5" + (f"; its sheet has {count} warning{'s'[:count - 1]}" if count else "")
 
     def report(self, request):
         """Writes the result and its planning sheet."""
-        name = pathlib.Path(self.result(request).decode()).with_suffix("")
-        done = subprocess.run([sys.executable, HERE / "report.py", name, "-output", f"{name}.html", "-scene",
-                               self.server.scene], capture_output=True, text=True)
+        with self.server.writing:
+            name, _ = self.write(request["plan"])
+            done = subprocess.run([sys.executable, HERE / "report.py", name, "-output", f"{name}.html", "-scene",
+                                   self.server.scene], capture_output=True, text=True)
         if done.returncode != 0:
             raise ValueError(done.stderr.strip().splitlines()[-1] if done.stderr.strip() else "report.py failed")
         return f"{name}.html".encode()
@@ -222,7 +229,7 @@ def make_server(session, scene, port=0):
     except OSError as reason:
         refuse(f"-port {port}: {reason.strerror}; choose another one, or 0 for a free one")
     server.daemon_threads = True
-    server.session, server.scene = session, scene.resolve()
+    server.session, server.scene, server.writing = session, scene.resolve(), threading.Lock()
     server.angles = ProfileAngles(server.scene, session)
     server.token, server.page = secrets.token_urlsafe(18), page(server.scene)
     return server, f"http://127.0.0.1:{server.server_address[1]}/?token={server.token}"

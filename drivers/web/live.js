@@ -233,7 +233,7 @@ class Planner {
     this.placeHandle();
     this.showNumbers();
     this.moveBones();
-    byId("under").textContent = "";
+    byId("under").textContent = byId("written").textContent = "";
     byId("angles").style.visibility = "hidden";
     this.preview();
     this.solveSoon();
@@ -327,7 +327,10 @@ class Planner {
     const current = () => number === this.asked && isSame(plan, this.plan);
     try {
       const answer = await ask("/solve", {plan, tangents});
-      if (!answer.byteLength) return;  // overtaken
+      if (!answer.byteLength) {  // overtaken by another plan, of this window or of another one
+        if (current()) this.timer = setTimeout(() => this.solve(tangents), 1000 * (1 + Math.random()));
+        return;
+      }
       const {head, arrays} = unpack(answer);
       if (head.converged) this.exact = {plan, position: arrays.position};
       if (tangents) this.takeTangents(plan, head, arrays);
@@ -442,7 +445,7 @@ class Planner {
   async write(what) {
     try {
       const path = new TextDecoder().decode(await ask(what, {plan: this.plan}));
-      this.mark("exact", `written: ${path}`);
+      byId("written").textContent = `written: ${path}`;
     } catch (error) {
       this.mark("failed", error.message);
     }

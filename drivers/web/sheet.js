@@ -192,10 +192,7 @@ class Sheet {
       bySheetId("distance").textContent = event.target.checked ? "Choose two points of the face." : "";
     });
     this.viewer.onHover = (hit, event) => this.tell(hit, event);
-    this.viewer.onClick = (hit, event) => {
-      this.measure(hit);
-      if (event.pointerType === "touch") this.tell(hit, event);
-    };
+    this.viewer.onClick = hit => this.measure(hit);
   }
 
   // Pictures for the print, where a view to turn is of no use: [[title, view, state, colored]].

@@ -243,7 +243,9 @@ class FaceViewer {
     canvas.addEventListener("pointerup", event => {
       const still = down && Math.hypot(event.clientX - down[0], event.clientY - down[1]) < 5;
       down = null;
-      if (still) this.onClick?.(this.pick(event), event);
+      if (!still) return;
+      this.onClick?.(this.pick(event), event);
+      if (event.pointerType === "touch") this.onHover?.(this.pick(event), event);
     });
     canvas.addEventListener("pointermove", event => {
       if (down || !this.onHover) return;
@@ -254,7 +256,9 @@ class FaceViewer {
       });
       waiting = event;
     });
-    canvas.addEventListener("pointerleave", event => this.onHover?.(null, event));
+    canvas.addEventListener("pointerleave", event => {
+      if (event.pointerType !== "touch") this.onHover?.(null, event);  // a finger leaves when it is lifted
+    });
   }
 
   add(described) {

@@ -38,6 +38,7 @@ struct Base {
 /// A solved plan that can be written: this rank's rows.
 struct Solved {
   PlanSession::Placements plan;
+  double accuracy;  // mm
   model::StepNumbers numbers;
   model::StepRows rows;
   solve::Summary summary;
@@ -142,7 +143,7 @@ std::vector<Vec3> PlanSession::State::weights(
 
 Solved PlanSession::State::search(const Placements& placements, const solve::Settings& with,
                                   const solve::Start& start) {
-  Solved solved{placements, {}, {}, {}};
+  Solved solved{placements, with.path.accuracy, {}, {}, {}};
   solved.summary = solver->find(with, start, [&](const auto& numbers, const auto& rows) {
     solved.numbers = numbers;
     solved.rows = rows;
@@ -289,10 +290,15 @@ PlanSession::Answer PlanSession::solve(const Request& request) {
   return answer;
 }
 
+bool PlanSession::has_solved(const Placements& plan, double accuracy) const {
+  const std::optional<Solved>& last = state_->last;
+  return last && same(last->plan, plan) && last->accuracy <= accuracy;
+}
+
 std::string PlanSession::write(const std::filesystem::path& name) {
   State& s = *state_;
   if (!s.last) base::refuse("there is no solved plan to write; solve one first");
-  const auto& [plan, numbers, rows, summary] = *s.last;
+  const auto& [plan, accuracy, numbers, rows, summary] = *s.last;
   s.take(plan);
   std::optional<results::NameLock> lock;
   base::on_root(s.comm, [&] { lock.emplace(name); });

@@ -100,6 +100,10 @@ void read_other_rest(const json& value, Request& request) {
   if (request.other_rest) request.from_rest = true;
 }
 
+void read_requested_plan(const json& value, Request& request) {
+  request.plan = read_plan(value, "plan");
+}
+
 void read_points(const json& value, Request& request) {
   if (value != "skin" && value != "all") refuse_value("points", "\"skin\" or \"all\"", value);
   request.all_points = value == "all";
@@ -136,7 +140,7 @@ const std::vector<VerbMembers>& verbs() {
       {"describe", Verb::describe, {}},
       {"solve",
        Verb::solve,
-       {{"plan", [](const json& value, Request& r) { r.plan = read_plan(value, "plan"); }},
+       {{"plan", read_requested_plan},
         {"accuracy", read_accuracy},
         {"tangents",
          [](const json& value, Request& r) { r.tangents = read_flag(value, "tangents"); }},
@@ -150,7 +154,7 @@ const std::vector<VerbMembers>& verbs() {
         {"attach_regions", read_change<attach_regions>},
         {"release", read_change<release>},
         {"boundary", read_change<boundary>}}},
-      {"write", Verb::write, {{"output", read_output, true}}},
+      {"write", Verb::write, {{"output", read_output, true}, {"plan", read_requested_plan}}},
       {"quit", Verb::quit, {}}};
   return table;
 }

@@ -23,7 +23,7 @@ using PlanMoves = std::map<std::string, scene::Placement>;
 /// are not checked.
 struct Request {
   Verb verb = Verb::quit;
-  PlanMoves plan;
+  std::optional<PlanMoves> plan;
   std::optional<double> accuracy;  ///< mm
   bool tangents = false;
   std::vector<std::pair<int64_t, Vec3>> gradient_of;  ///< points of the answer and their weights

@@ -63,6 +63,8 @@ class Service {
   void describe(Reply& reply);
   void solve(const Request& request, Reply& reply);
   PlanSession::Placements place(const PlanMoves& plan) const;
+  PlanSession::Placements scenes_plan() const;
+  void write(const Request& request, Reply& reply);
   template <class Row>
   std::vector<Row> visible(const std::vector<Row>& rows) const;
   void find_visible();
@@ -105,7 +107,7 @@ void Service::dispatch(const Request& request, Reply& reply) {
   if (request.verb == Verb::change) change(request.changes);
   if (request.verb == Verb::describe || request.verb == Verb::change) describe(reply);
   if (request.verb == Verb::solve) solve(request, reply);
-  if (request.verb == Verb::write) reply.head()["summary"] = session_->write(request.output);
+  if (request.verb == Verb::write) write(request, reply);
 }
 
 /// Builds the scene with changes in place of those before. Where it cannot be, it stays as it is.
@@ -244,16 +246,33 @@ void Service::add_arrays(const PlanSession::Answer& answer, bool all, Reply& rep
   }
 }
 
+/// The plan of the scene's moves.
+PlanSession::Placements Service::scenes_plan() const {
+  PlanSession::Placements plan;
+  for (const PlanSession::Piece& piece : session_->pieces()) plan.push_back(piece.scenes);
+  return plan;
+}
+
+/// Writes the requested plan, which is solved unless it was solved last. No later request ends
+/// that.
+void Service::write(const Request& request, Reply& reply) {
+  if (request.plan) {
+    const PlanSession::Placements plan = place(*request.plan), from = scenes_plan();
+    const double accuracy = session_->accuracy();
+    if (!session_->has_solved(plan, accuracy))
+      session_->solve({.plan = plan, .accuracy = accuracy, .base = &from});
+  }
+  reply.head()["summary"] = session_->write(request.output);
+}
+
 void Service::solve(const Request& request, Reply& reply) {
   find_visible();
   PlanSession::Request requested;
-  requested.plan = place(request.plan);
+  requested.plan = place(request.plan.value_or(PlanMoves()));
   requested.accuracy = request.accuracy.value_or(session_->accuracy());
   requested.tangents = request.tangents;
   base::on_root(comm_, [&] { requested.functional = functional(request); });
-  PlanSession::Placements scenes;
-  for (const PlanSession::Piece& piece : session_->pieces()) scenes.push_back(piece.scenes);
-  const PlanSession::Placements from = request.base ? place(*request.base) : scenes;
+  const PlanSession::Placements from = request.base ? place(*request.base) : scenes_plan();
   if (!request.from_rest) requested.base = &from;
   requested.other_rest = request.other_rest;
   requested.abandoned = [this] { return requests_->superseded(ends_a_solve); };

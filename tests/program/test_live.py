@@ -237,6 +237,17 @@ def test_the_result_of_a_plan_has_its_own_bones_after_one_that_was_abandoned(ses
             assert np.array_equal(before["model"][name], after["model"][name]), name
 
 
+def test_a_plan_is_written_whatever_was_solved_last(session, tmp_path):
+    session.solve(B)
+    session.write(tmp_path / "before")
+    session.solve(A)
+    session.write(tmp_path / "after", B)
+    with h5py.File(tmp_path / "before.h5") as before, h5py.File(tmp_path / "after.h5") as after:
+        assert np.array_equal(before["model/bone_transform"], after["model/bone_transform"])
+        one, other = (list(h5["step"].values())[-1]["point/position"][:] for h5 in (before, after))
+    assert np.abs(one - other).max() == 0
+
+
 def test_a_full_result_holds_the_given_skin(tmp_path):
     text = SCENE.read_text().replace(": head_", f": {SCENE.parent}/head_").replace("  layers: 4", "  layers: 2\n  edge: 8")
     (tmp_path / "plan.yaml").write_text(text)

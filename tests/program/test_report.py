@@ -291,16 +291,24 @@ def test_the_view_works_in_a_browser(report, opened, tmp_path):
       sheet.measure(viewer.pick(at(0.45, 0.5)));
       sheet.measure(viewer.pick(at(0.55, 0.5)));
       const ends = sheet.measured.map(one => one.point);
+      const distance = document.getElementById("distance").textContent;
       sheet.color("movement");
-      return {drawn: drawn / (same.length / 4), changed, sentence: sheet.sentence(hit), moved,
+      const canvas = viewer.three.renderer.domElement, finger = {
+        bubbles: true, pointerId: 1, pointerType: "touch", ...at(0.6, 0.75)};
+      canvas.setPointerCapture = canvas.releasePointerCapture = () => {};
+      for (const type of ["pointerdown", "pointerup", "pointerleave"])
+        canvas.dispatchEvent(new PointerEvent(type, finger));
+      const tip = document.getElementById("tip");
+      return {tapped: tip.hidden ? "hidden" : tip.textContent,
+        drawn: drawn / (same.length / 4), changed, sentence: sheet.sentence(hit), moved,
         point: hit.point, on: hit.surface.name, inside: hit.at(after, 3),
-        distance: document.getElementById("distance").textContent,
-        apart: Math.hypot(...ends[0].map((v, k) => v - ends[1][k])),
+        distance, apart: Math.hypot(...ends[0].map((v, k) => v - ends[1][k])),
         bar: document.getElementById("bar").textContent,
         loaded: performance.getEntriesByType("resource").map(one => one.name)
           .filter(name => !name.startsWith("data:") && !name.startsWith("blob:"))};
     """)
     assert "error" not in found, found
+    assert re.search(r"moves \d", found["tapped"]), found["tapped"]
     assert found["loaded"] == [] and found["drawn"] > 0.15
     assert found["changed"][0] == 0 < found["changed"][1]
     far = math.hypot(*found["moved"])

@@ -299,10 +299,11 @@ class Session:
         """The scene as repose-live describes it: (head, arrays)."""
         return self.ask({"do": "describe"})
 
-    def write(self, output):
-        """Writes the last answer as a full result OUTPUT.h5 with its XDMF files. Returns the summary that it
-        holds, a text."""
-        head, _ = self.ask({"do": "write", "output": str(pathlib.Path(output).resolve())})
+    def write(self, output, plan=None):
+        """Writes a plan, solved unless it was solved last, or the last answer, as a full result OUTPUT.h5 with its
+        XDMF files. Returns the summary that it holds, a text."""
+        request = {"do": "write", "output": str(pathlib.Path(output).resolve())}
+        head, _ = self.ask(request if plan is None else {**request, "plan": _plain(plan)})
         return head["summary"]
 
     def close(self):

@@ -36,7 +36,7 @@ class PlanSession {
     std::vector<std::pair<int64_t, Vec3>> functional = {};
     const Placements* base = nullptr;  ///< where it begins; null: the initial state
     bool other_rest = false;           ///< from the initial state, search for another rest position
-    std::function<bool()> abandoned;   ///< as solve::Settings
+    std::function<bool()> abandoned = {};  ///< as solve::Settings
   };
   struct Answer {
     solve::Summary summary;                ///< on all ranks
@@ -64,6 +64,8 @@ class PlanSession {
 
   /// Throws InputError where the plan is outside the box.
   Answer solve(const Request& request);
+  /// Returns whether the last answer is that of a plan, at least as accurate; on all ranks.
+  bool has_solved(const Placements& plan, double accuracy) const;
   /// Writes the last answer as NAME.h5 with its XDMF files. Returns the summary that it holds, of
   /// the face and what it touches. Throws InputError without an answer.
   std::string write(const std::filesystem::path& name);
