@@ -2,14 +2,14 @@
 """Fig. 2 of the paper for any result: the forces on the skin's free points at the initial position,
 by skin tension and weight alone (before) and with the tensions that balance them (after).
 
-    drivers/plot_equilibrium.py NAME.h5 PICTURE.png [GX GY GZ]
+    drivers/plot_equilibrium.py NAME PICTURE.png [GX GY GZ]
 
 Forces are recomputed from /model. GX GY GZ is the gravity field of the recording (the scene's
 scan_gravity), N/kg; when not given, that of /model.
 Needs: apt-get install --no-install-recommends python3-matplotlib python3-h5py
 """
 
-from sheet.script import Unusable, is_number, reading, refuse_missing, run, words
+from sheet.script import Unusable, is_number, reading, refuse_missing, result_name, run, words
 from sheet.whole_file import Target, write_figure
 
 try:
@@ -84,9 +84,10 @@ def draw_forces(points, before, after, target):
 
 
 def main():
-    file, picture, *field = words(__doc__, 2, 5)
+    name, picture, *field = words(__doc__, 2, 5)
     if len(field) not in (0, 3) or not all(map(is_number, field)):
         raise Unusable(f"GX GY GZ: give three numbers in place of '{' '.join(field)}'")
+    file = f"{result_name(name)}.h5"
     target = Target(picture, ".png", [file])
     draw_forces(*initial_forces(file, [float(number) for number in field]), target)
 

@@ -2,14 +2,16 @@
 """Fig. 9 of the paper for any results with incisions: how far the skin's tension opens a cut. Prints
 the widest gap of each layer and draws the skin around the cut, looked at along its normal.
 
-    drivers/plot_incision.py PICTURE.png NAME.h5 [NAME.h5 ...]
+    drivers/plot_incision.py PICTURE.png NAME [NAME ...]
+
+NAME is a result (NAME.h5, the ending may be left out).
 
 Needs: apt-get install --no-install-recommends python3-matplotlib python3-h5py
 """
 
 import os
 
-from sheet.script import Unusable, reading, refuse_missing, run, words
+from sheet.script import Unusable, reading, refuse_missing, result_name, run, words
 from sheet.whole_file import Target, write_figure
 
 try:
@@ -89,7 +91,8 @@ def draw(axes, result, middle, frame, half):
 
 
 def main():
-    picture, *files = words(__doc__, 2)
+    picture, *names = words(__doc__, 2)
+    files = [f"{result_name(name)}.h5" for name in names]
     target, results = Target(picture, ".png", files), [Result(file) for file in files]
     for result in results:
         gaps = ", ".join(f"{gap:.3f} mm in layer {a}" for a, gap in enumerate(result.gaps()))

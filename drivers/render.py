@@ -558,7 +558,10 @@ def difference(results, states):
 
 def scales(drawn):
     """The color table of each colored column, one for all panels of it."""
-    numbers = {}
+    numbers, stress = {}, {head(panel.column, panel.result): panel.result.name for panel in drawn
+                           if panel.column == "stress"}
+    if len(stress) > 1:
+        raise Unusable(", ".join(f"{name} has {unit}" for unit, name in stress.items()) + ": draw them one by one")
     for panel in drawn:
         if panel.column in (*COLORED, "difference"):
             numbers.setdefault(panel.column, []).append(panel.state[panel.column])

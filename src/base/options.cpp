@@ -349,8 +349,8 @@ void Options::refuse_unknown(const std::string& name) const {
 
 void Options::check_values(const Option& option, const std::vector<std::string>& values) const {
   if (static_cast<int>(values.size()) < option.values)
-    refuse("{}: -{} needs {} value{}: {}", program_, option.name, option.values,
-           option.values == 1 ? "" : "s", expected(option));
+    refuse("{}: -{} needs {} value{} {}", program_, option.name, option.values,
+           option.values == 1 ? ":" : "s, each", expected(option));
   for (const std::string& value : values) {
     if (is_valid(option, value)) continue;
     if (const auto removed = option.removed.find(value); removed != option.removed.end())

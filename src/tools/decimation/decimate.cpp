@@ -17,6 +17,8 @@ namespace {
 constexpr double proof_accuracy = 5e-4;
 /// The distances of a result without a bound are known to this share of the input's extent.
 constexpr double measure_accuracy = 1e-5;
+/// Least distance that is proven, as a share of the input's extent.
+constexpr double least_share = 1e-9;
 /// First and last tolerance on the way to a count, as shares of the input's extent.
 constexpr double first_share = 5e-4, last_share = 0.1;
 
@@ -76,6 +78,12 @@ void collapse(Collapser& collapser, const Surface& surface, const DecimateOption
 
 Decimated decimate(const Surface& surface, const DecimateOptions& options,
                    const std::function<void(int64_t)>& report) {
+  const double least = least_share * bounding_diagonal(surface.points);
+  if (options.distance < least)
+    base::refuse(
+        "{}: -distance {} mm is less than {:.1g} mm, to which distances in a mesh this large "
+        "are known; allowed are {:.1g} mm or more",
+        surface.name, options.distance, least, least);
   Decimated decimated;
   std::vector<char> locked = border_vertices(EdgeTable(surface.triangles), surface.points.size());
   for (const Vec3& landmark : options.landmarks) {
