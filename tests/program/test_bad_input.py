@@ -8,7 +8,7 @@ import meshio
 import numpy as np
 import pytest
 
-from conftest import PROJECT
+from conftest import PROJECT, some_on_ranks
 
 SCENE = """skin: paper_skin.ply
 bones:
@@ -280,9 +280,7 @@ def given(tmp_path):
     return Input(tmp_path / "input")
 
 
-@pytest.mark.parametrize("case, ranks", [
-    pytest.param(case, ranks, marks=[] if ranks == 1 or k % 4 == 0 else pytest.mark.long)
-    for k, case in enumerate(CASES) for ranks in (1, 3)])
+@pytest.mark.parametrize("case, ranks", some_on_ranks(CASES, 3))
 def test_bad_input_is_refused(run, given, case, ranks):
     spoil, words = CASES[case]
     arguments = spoil(given)

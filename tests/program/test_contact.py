@@ -6,7 +6,7 @@ import h5py
 import numpy as np
 import pytest
 
-from conftest import PROJECT, runner
+from conftest import PROJECT, runner, some_on_ranks
 from tissue import last, model_of
 
 DATA = PROJECT.parent / "shared/data/head"
@@ -66,6 +66,7 @@ def test_an_operation_gives_one_face_on_any_ranks_and_in_any_steps(solve, operat
         assert np.linalg.norm(other - first, axis=1).max() < 2 * ACCURACY
 
 
+@pytest.mark.long
 def test_any_minimizer_ends_at_the_position_of_less_energy_and_reports_the_other(folder, environment):
     """A point at the saw-cut edge of the maxilla rests on its front with 13.3308 N mm."""
     run = runner(folder, environment)
@@ -197,8 +198,7 @@ BAD = {
 }
 
 
-@pytest.mark.parametrize("case", BAD)
-@pytest.mark.parametrize("ranks", [1, 2])
+@pytest.mark.parametrize("case, ranks", some_on_ranks(BAD, 2))
 def test_bad_contact_is_refused_in_one_line(folder, environment, case, ranks):
     before, after, names = BAD[case]
     (folder / "bad.yaml").write_text(SOLID.replace(before, after, 1))

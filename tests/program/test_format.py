@@ -7,7 +7,7 @@ import h5py
 import numpy as np
 import pytest
 
-from conftest import PROJECT
+from conftest import PROJECT, RUNS_ALL
 from format_reader import (Contact, File, adhering, adhesion, advance, motions, prescribed,
                            solid)
 from lips import solve_lips
@@ -58,7 +58,7 @@ def close(value, stored, scale, tolerance=ROUNDING):
 
 
 def test_every_number_of_every_step_follows_from_the_page(result, contact):
-    for arrays, numbers in result.steps:
+    for arrays, numbers in result.steps if RUNS_ALL else result.steps[-1:]:
         again = tissue(result, arrays)
         again |= touching(result, contact, arrays, numbers)
         assert again.keys() - arrays.keys() == numbers.keys() - NOT_RECOMPUTED

@@ -419,8 +419,8 @@ def test_landmarks_are_searched_on_skull_and_maxilla_together(parts, tmp_path, e
     assert max(np.linalg.norm(places[0][name] - places[1][name]) for name in places[0]) < 1e-6
 
 
-@pytest.mark.parametrize("operation", [
-    "genioplasty, 6 mm forward", pytest.param("Le Fort I, 4 mm up, 3 degrees yaw", marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("operation", ["genioplasty, 6 mm forward", "Le Fort I, 4 mm up, 3 degrees yaw"])
 def test_a_head_that_is_turned_in_the_scan_has_the_same_plan(parts, tmp_path, environment, operation):
     turn, scenes, pieces = Rotation.from_euler("xyz", [-12, 5, -8], degrees=True).as_matrix(), [], []
     for name, axes in (("upright", np.eye(3)), ("turned", turn)):

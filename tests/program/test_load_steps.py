@@ -27,6 +27,7 @@ def test_twice_as_many_steps(solved, scene):
     check(solved, scene, 1e-6, [2])
 
 
+@pytest.mark.long
 def test_twice_as_many_steps_on_the_finer_head(solved):
     check(solved, "head_springs_advance.yaml", 1e-6, [2], ranks=2)
 

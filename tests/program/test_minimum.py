@@ -41,7 +41,7 @@ CASES = {
 }
 
 
-@pytest.fixture(params=[pytest.param(case, marks=[pytest.mark.long] if case in ("advance", "opening") else [])
+@pytest.fixture(params=[pytest.param(case, marks=[pytest.mark.long] if case in ("advance", "opening", "paper") else [])
                         for case in CASES], scope="module")
 def found(request, solved, tmp_path_factory):
     """The model in numpy, and the last step of the result."""

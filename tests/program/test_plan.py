@@ -44,7 +44,7 @@ def test_a_sweep_through_equal_moves_is_continuous(run, scene, tmp_path):
     assert max(steps) < 0.1
 
 
-@pytest.mark.parametrize("ranks", [1, 2])
+@pytest.mark.parametrize("ranks", [pytest.param(1, marks=pytest.mark.long), 2])
 def test_tangents_are_differences_of_faces(run, scene, tmp_path, ranks):
     def solve(move, *options):
         name = tmp_path / "face"

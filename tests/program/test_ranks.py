@@ -43,7 +43,7 @@ def check_same(one, many):
             assert difference <= 1e-6 * max(1, np.abs(here[scale]).max())
 
 
-@pytest.mark.parametrize("ranks", [2, 3, 5])
+@pytest.mark.parametrize("ranks", [2, pytest.param(3, marks=pytest.mark.long), 5])
 def test_same_face_on_any_number_of_ranks(solved, ranks):
     options = ["paper_jaw_advance.yaml", "-accuracy", "1e-9"]
     check_same(solved(*options), solved(*options, ranks=ranks))
@@ -54,8 +54,10 @@ def test_same_face_of_a_turned_jaw(solved):
     check_same(solved(*options), solved(*options, ranks=3))
 
 
-@pytest.mark.parametrize("ranks", [2, 3, 5])
-@pytest.mark.parametrize("scene", ["head_solid.yaml", "head_le_fort.yaml", "head_instrument.yaml"])
+@pytest.mark.parametrize("scene, ranks", [
+    pytest.param(scene, ranks, marks=[] if ranks == quick else pytest.mark.long)
+    for scene, quick in (("head_solid.yaml", 5), ("head_le_fort.yaml", 2), ("head_instrument.yaml", 3))
+    for ranks in (2, 3, 5)])
 def test_ranks_make_the_parts_of_a_solid_that_one_rank_builds(solved, scene, ranks):
     one, many = solved(scene), solved(scene, ranks=ranks)
     model, other = model_of(one), model_of(many)
@@ -180,7 +182,7 @@ def test_same_face_with_weight_turgor_and_forces(solved, tmp_path, volume):
     assert last(solved(*options))["potential"] != 0
 
 
-@pytest.mark.parametrize("ranks", [2, pytest.param(3, marks=pytest.mark.long), 5])
+@pytest.mark.parametrize("ranks", [2, *(pytest.param(ranks, marks=pytest.mark.long) for ranks in (3, 5))])
 def test_a_run_on_ranks_repeats_bit_by_bit(run, tmp_path, ranks):
     positions = set()
     for _ in range(3):

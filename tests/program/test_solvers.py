@@ -45,8 +45,8 @@ def work(path, key="evaluations"):
     return sum(int(step[key]) for step in steps(path))
 
 
-@pytest.mark.parametrize("scene", [ADVANCE, OPENING])
-@pytest.mark.parametrize("ranks", [1, 2])
+@pytest.mark.parametrize("scene, ranks", [
+    (ADVANCE, 2), (OPENING, 1), *(pytest.param(*more, marks=pytest.mark.long) for more in ((ADVANCE, 1), (OPENING, 2)))])
 def test_lmvm_from_the_stiffness_finds_the_same_face_in_few_evaluations(check, solved, scene, ranks):
     check(scene, *STIFFNESS, ranks=ranks)
     few = solved(scene, "-accuracy", 0.01, *STIFFNESS, ranks=ranks)

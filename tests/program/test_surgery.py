@@ -8,7 +8,7 @@ import meshio
 import numpy as np
 import pytest
 
-from conftest import PROJECT, runner
+from conftest import PROJECT, runner, some_on_ranks
 from tissue import last, model_of, prism_volumes
 
 MESHES = PROJECT / "meshes"
@@ -160,8 +160,7 @@ BAD_SCENES = {
 }
 
 
-@pytest.mark.parametrize("ranks", [1, 3])
-@pytest.mark.parametrize("case", BAD_SCENES)
+@pytest.mark.parametrize("case, ranks", some_on_ranks(BAD_SCENES, 3))
 def test_bad_plans_are_refused_in_one_line(run, folder, case, ranks):
     text, words = BAD_SCENES[case]
     scene_with(folder, text)

@@ -178,6 +178,7 @@ def test_depths_for_other_layers_are_refused(run, tmp_path):
     assert result.returncode == 1 and "tissue.depths" in result.stderr
 
 
+@pytest.mark.long
 def test_models_of_other_layers_are_those_of_the_scene(run, tmp_path):
     """What landmarks add to a scene, a vestibule and the tone of the mouth, is in all models."""
     head = PROJECT / "meshes/head"
