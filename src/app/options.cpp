@@ -55,7 +55,8 @@ std::vector<base::Option> model_options() {
        .choices = {"preview", "balanced", "exact"}},
       {"adapt", OptionKind::flag, "",
        "Solve the coarsest model whose skin is within the accuracy: of springs of the scene's own "
-       "model, of a solid, which may be refined too, of the continuum."},
+       "model, of a solid, which may be refined too, of the continuum; exit status 2 where its "
+       "skin is not."},
       {"discretisation", OptionKind::flag, "",
        "Estimate how far mesh and layers leave the skin from the continuum, by coarser models."}};
 }

@@ -208,11 +208,12 @@ Coarser Run::solve_coarser() {
   adapt::GridSequence sequence =
       adapt::solve_sequence(comm, job_.anatomy ? *job_.anatomy : none,
                             discrete::gather_model(comm, job_.local_model), requested);
-  Coarser coarser{describe_sequence(sequence), {}, {}};
+  Coarser coarser{describe_sequence(sequence), {}, {}, false};
   const bool converging = !compare && !strategy_.preview && job_.local_model.part.solid;
   const bool last = (strategy_.preview || converging) && sequence.levels.size() > 1;
   if (sequence.near_enough || last) {
     coarser.discretization_error = sequence.levels.back().discretization_error;
+    coarser.misses_continuum = converging && !sequence.near_enough;
     coarser.report +=
         describe_choice(sequence, settings.path.accuracy, converging ? &strategy_.limit : nullptr);
     settings.path.accuracy = sequence.last_settings.path.accuracy;
@@ -296,7 +297,8 @@ base::Exit Run::solve() {
                            given;
   print(text);
   base::on_root(comm, [&] { results::add_summary(name_ + ".h5", text); });
-  const bool holds = summary.path.complete() && !folded && (!path || path->holds());
+  const bool holds =
+      summary.path.complete() && !folded && !coarser.misses_continuum && (!path || path->holds());
   return holds ? base::Exit::done : base::Exit::not_converged;
 }
 

@@ -17,6 +17,7 @@ struct Coarser {
   std::string report;                           ///< on rank 0
   std::optional<adapt::GridSequence> compared;  ///< with the scene's own model, where requested
   std::optional<double> discretization_error;   ///< mm, of the model that was chosen, if one was
+  bool misses_continuum = false;  ///< that is more than was requested of -adapt; on all ranks
 };
 
 /// Writes every step to the result, and from time to time what was reached to a checkpoint. All
