@@ -1,9 +1,13 @@
 #include "repose/base/petsc.h"
 
+#include <fmt/ranges.h>
+
 #include <array>
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
+#include <string_view>
+#include <vector>
 
 #include "mpi_environment.h"
 #include "repose/base/options.h"
@@ -17,9 +21,11 @@ std::string text_of(PetscErrorCode code) {
   const char* text = nullptr;
   char* specific = nullptr;
   PetscErrorMessage(code, &text, &specific);
-  return fmt::format("{}{}{} (error {})", text ? text : "unknown error",
-                     specific && *specific ? ": " : "", specific ? specific : "",
-                     static_cast<int>(code));
+  std::vector<std::string_view> words;
+  for (const char* part : {text, static_cast<const char*>(specific)})
+    if (part && *part) words.emplace_back(part);
+  if (words.empty()) words.emplace_back("unknown error");
+  return fmt::format("{} (error {})", fmt::join(words, ": "), static_cast<int>(code));
 }
 
 /// Who reads no further does not end the work: writing fails, without a signal.
