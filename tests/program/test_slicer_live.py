@@ -171,6 +171,22 @@ def test_what_cannot_be_followed_is_said_in_a_line(started):
     stand_in.move(chin, far)  # nothing follows any more
 
 
+def test_an_answer_of_an_earlier_plan_is_not_shown_after_a_refusal(started):
+    stand_in, widget, lines = started
+    stand_in.run_until(lambda: widget.follower.reference is not None)
+    chin = stand_in.nodes["Move chin"]
+    home, near, far = (chin.matrix.copy() for _ in range(3))
+    near[1, 3] += 1  # RAS: forward
+    far[1, 3] += 30
+    stand_in.move(chin, near)
+    stand_in.move(chin, far)
+    end = time.monotonic() + 3
+    stand_in.run_until(lambda: time.monotonic() > end)
+    assert "is outside the plan's box" in lines[-1], lines
+    stand_in.move(chin, home)
+    stand_in.run_until(lambda: lines[-1].startswith("exact"))
+
+
 def test_a_scene_without_a_plan_is_refused(started):
     _, widget, lines = started
     widget.stop()

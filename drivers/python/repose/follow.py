@@ -46,15 +46,21 @@ class Follower:
             plan = {piece: motion_of(matrix, self.centroids[piece])
                     for piece, matrix in self.view.matrices().items()}
         except ValueError as reason:
-            return self.view.tell(str(reason))
+            return self._refuse(str(reason))
         if outside := self._outside(plan):
-            return self.view.tell(outside)
+            return self._refuse(outside)
         if plan == self.plan:
             return
         self.plan = plan
         if self.reference:
             self.view.show(self.preview(plan), "preview")
         self._ask(plan, False)
+
+    def _refuse(self, reason):
+        """Says why there is no skin of the present transforms; answers under way are none of theirs."""
+        self.plan = None
+        self._number += 1
+        self.view.tell(reason)
 
     def preview(self, plan):
         """The skin by the derivatives of the latest answer that has them."""
