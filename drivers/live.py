@@ -18,6 +18,7 @@ import signal
 import subprocess
 import sys
 import threading
+import types
 import urllib.parse
 import webbrowser
 
@@ -68,25 +69,20 @@ def scene_with_moves(path, moves):
 
 
 class ProfileAngles:
-    """Angles of the profile, by the scene's landmarks and otherwise by the shape of the skin."""
+    """Angles of the profile along the axes of the head, by the scene's landmarks and otherwise by the shape of
+    the skin."""
 
     def __init__(self, scene, session):
-        self.before, self.corners = session.initial, session.triangles
+        self.axes, self.corners = session.axes, session.triangles
+        self.before = session.initial @ self.axes.T
         self.points = {}  # {landmark: place on the initial skin}
         try:
-            import sheet.landmarks
+            from sheet import profile
         except ImportError:
             return  # they need h5py
-        self.points = self.by_shape() | self.given(scene)
-
-    def by_shape(self):
-        from sheet import landmarks, profile
-        tip = self.before[self.before[:, 1].argmin()]
-        for aside in (0, 1.5, -1.5, 3, -3):
-            segments = profile.cut(self.before, self.corners, ((tip[0] + aside, 0, 0), (1, 0, 0)))[0]
-            if found := landmarks.by_shape(segments):
-                return found
-        return {}
+        known = self.given(scene)
+        profile.complete(known, types.SimpleNamespace(before=self.before, after=self.before, corners=self.corners))
+        self.points = {name: place for name, (place, _) in known.items()}
 
     def given(self, scene):
         from sheet import landmarks
@@ -95,18 +91,18 @@ class ProfileAngles:
             read = landmarks.read_landmarks(scene.parent / named[1].strip()) if named else {}
         except landmarks.Unusable:
             return {}
-        near = {name: landmarks.on_surface(self.before, self.before, self.corners, point)
+        near = {name: landmarks.on_surface(self.before, self.before, self.corners, self.axes @ point)
                 for name, point in read.items()}
-        placed = [{"name": name, "on": "skin", "before": place, "after": place}
-                  for name, (place, _, distance) in near.items() if distance <= landmarks.NEAR]
-        return {name: place for name, (place, _) in landmarks.known_places(placed).items()}
+        return landmarks.known_places([{"name": name, "on": "skin", "before": place, "after": place}
+                                       for name, (place, _, distance) in near.items() if distance <= landmarks.NEAR])
 
     def of(self, position):
         """[{name, before, after}] in degrees."""
         if not self.points:
             return []
         from sheet import landmarks, measures
-        known = {name: landmarks.on_surface(self.before, position, self.corners, point)[:2]
+        after = position @ self.axes.T
+        known = {name: landmarks.on_surface(self.before, after, self.corners, point)[:2]
                  for name, point in self.points.items()}
         return [{"name": one["name"], "before": one["values"][0], "after": one["values"][1]}
                 for one in measures.measured(known, []) if one["name"] in ANGLES]

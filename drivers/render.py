@@ -47,6 +47,7 @@ if "REPOSE_RENDER" in os.environ:  # inside ParaView's interpreter, see find_scr
 VIEWS = {"front": (0, -1, 0), "three-quarter": (-0.65, -0.75, 0.1), "profile": (-1, 0, 0),
          "three-quarter-left": (0.65, -0.75, 0.1)}
 COLORED = ("movement", "advance", "stress", "region")
+ROUNDING = 1e-9  # mm, N/mm² or N: less is shown as nothing
 COLUMNS = ("before", "after", *COLORED, "bones")
 COLUMN, TITLE, BAR, TEXT = 480, 64, 110, 34  # pixels
 SUPER = 2  # pixels drawn for one of the picture, along each axis
@@ -377,7 +378,8 @@ def round_up(number):
 
 def colors(column, numbers):
     """The color table of a column: from 0, or as far inwards as outwards."""
-    largest = 1.0 if column == "region" else round_up(float(np.abs(numbers).max())) or 1.0
+    peak = float(np.abs(numbers).max())
+    largest = 1.0 if column == "region" or peak < ROUNDING else round_up(peak)
     ramp, low = {"advance": (BOTH, -largest), "region": (REGION, 0.0)}.get(column, (RAMP, 0.0))
     table = vtk.vtkColorTransferFunction()
     for i, text in enumerate(ramp):

@@ -9,12 +9,11 @@ import pathlib
 import numpy as np
 
 from sheet import RAMP
-from sheet.landmarks import (BEYOND, BONES, NEAR, Parts, by_shape, known_places, on_surface,
-                             place_landmarks)
+from sheet.landmarks import BEYOND, BONES, NEAR, Parts, known_places, place_landmarks
 from sheet.meshes import Pack, coarser
 from sheet.measures import (following, measured, occlusion, reference, shift_in_words, turns,
                             turns_in_words)
-from sheet.profile import COLORS, cut, drawing, middle_plane, outlines
+from sheet.profile import COLORS, complete, cut, drawing, outlines
 from sheet.shown_skin import matching_rows, rows_of_patient
 from sheet.result import Figure
 from sheet.tables import folded, table, tenths
@@ -34,45 +33,9 @@ class Plan:
         placed, self.lost = place_landmarks(result, marks)
         self.placed = placed
         self.known, self.bones = known_places(placed), known_places(placed, BONES)
-        self.guessed = self.guess()
-        self.plane = middle_plane(result.solved, self.known)
-        self.find_sublabiale()
+        self.guessed, self.plane = complete(self.known, result.solved)
         self.parts = Parts.of(self.known)
         self.measures = measured(self.known | self.bones, norms)
-
-    def guess(self):
-        """Adds landmarks by the shape of the profile where they are not given; their names."""
-        if "subnasale" in self.known and "pogonion" in self.known:
-            return []
-        skin = self.result.solved
-        tip = self.known["pronasale"][0] if "pronasale" in self.known else \
-            skin.before[np.argmin(skin.before[:, 1])]
-        for aside in (0, 1.5, -1.5, 3, -3):
-            plane = np.array([tip[0] + aside, 0, 0]), np.array([1.0, 0, 0])
-            found = by_shape(cut(skin.before, skin.corners, plane)[0])
-            if found:
-                break
-        missing = [name for name in found if name not in self.known]
-        self.known |= {name: on_surface(skin.before, skin.after, skin.corners, found[name])[:2]
-                       for name in missing}
-        return missing
-
-    def find_sublabiale(self):
-        """The deepest place of the profile between lower lip and chin, where no landmark says it."""
-        skin, known = self.result.solved, self.known
-        points = cut(skin.before, skin.corners, self.plane)[0].reshape(-1, 3)
-        if "sublabiale" in known or not {"lower lip", "pogonion"} <= known.keys() or \
-                len(points) == 0:
-            return
-        lip, chin = known["lower lip"][0], known["pogonion"][0]
-        line = (chin - lip) / np.linalg.norm(chin - lip)
-        along = (points - lip) @ line
-        behind = points - lip - along[:, None] * line
-        depth = np.where((along > 0) & (along < np.linalg.norm(chin - lip)) &
-                         (np.linalg.norm(behind, axis=1) < 20), behind[:, 1], -np.inf)
-        if depth.max() > 0:
-            known["sublabiale"] = on_surface(skin.before, skin.after, skin.corners,
-                                             points[np.argmax(depth)])[:2]
 
 
 # ----- the view
@@ -85,16 +48,27 @@ def matched(first, second):
     return one.before + (other.after - other.before)[near]
 
 
+def uncertainties(plans):
+    """Of each plan, at the vertices of the first one's skin; None where it was not estimated."""
+    first, found = plans[0].result, []
+    for result in (plan.result for plan in plans):
+        unsure = result.uncertainty
+        if unsure is not None and result is not first:
+            unsure = unsure[rows_of_patient(result.skin, first.skin, [first.file, result.file])]
+        found.append(unsure)
+    return found
+
+
 def packed_skin(plans, appearance, others, pack):
     """The surface of the skin for the page, and its fields; `others`: its vertices after a second plan."""
     result = plans[0].result
     skin = appearance.skin if appearance else result.skin
     states = [skin.before, skin.after, *others]
     near = None if skin is result.skin else matching_rows(result.skin, skin)
-    unsure = result.uncertainty
     fields = {"solved": skin.solved}
-    if unsure is not None:
-        fields["uncertainty"] = unsure if near is None else unsure[near]
+    for number, unsure in enumerate(uncertainties(plans)):
+        if unsure is not None:
+            fields[f"uncertainty {number}"] = unsure if near is None else unsure[near]
     if len(plans) == 2 and near is not None:
         states[2] = skin.before + (states[2] - result.skin.before)[near]
     fields |= appearance.arrays() if appearance else {}
@@ -120,13 +94,14 @@ def is_oriented(points, corners):
 
 
 def packed_fields(values, count, pack):
-    """Fields of the skin; the same in all states after the first."""
+    """Fields of the skin: the uncertainty of each plan, and which part was solved."""
     fields = []
-    if "uncertainty" in values:
-        most = max(float(np.percentile(values["uncertainty"], 99)), 0.1)
-        stored = pack.numbers(values["uncertainty"])
+    unsure = [values.get(f"uncertainty {number}") for number in range(count)]
+    if known := [one for one in unsure if one is not None]:
+        most = max(float(np.percentile(np.concatenate(known), 99)), 0.1)
+        stored = [None if one is None else pack.numbers(one) for one in unsure]
         fields.append({"name": "uncertainty", "label": "uncertain by, mm", "high": most,
-                       "ramp": UNCERTAIN, "states": [stored] + [stored] * count})
+                       "ramp": UNCERTAIN, "states": [stored[0], *stored]})
     if np.ptp(values["solved"]) > 0:
         stored = pack.numbers(values["solved"])
         fields.append({"name": "solved", "label": "part of the skin", "high": 1.0, "ramp": REGION,
@@ -370,7 +345,7 @@ def measure_rows(plans):
             values.append(others.get(one["name"], {"values": (0, math.nan)})["values"][1])
         else:
             values.append(values[1] - values[0])
-        values = [tenths(value) if one["unit"] else Figure(f"{value:.2f}") for value in values]
+        values = [tenths(value) if one["unit"] else Figure(f"{value:.2f}".replace("-", "−")) for value in values]
         norm = "; ".join(f"{mean:g} ± {deviation:g} [{number + 1}]".replace("-", "−")
                          for mean, deviation, number in one["norms"])
         yield one["name"], one["definition"], one["unit"], *values, norm

@@ -3,7 +3,7 @@ outline of the bones, the landmarks and a scale. It looks to the right."""
 
 import numpy as np
 
-from sheet.landmarks import ABOVE_CHIN, MIDLINE
+from sheet.landmarks import ABOVE_CHIN, MIDLINE, by_shape, on_surface
 
 HEIGHT, MARGIN = 620, 16
 COLORS = ("before", "after", "other")
@@ -23,6 +23,44 @@ def middle_plane(skin, known):
         direction = np.linalg.svd(points - middle)[2][0]
         normal -= direction * (normal @ direction)
     return middle, normal / np.linalg.norm(normal)
+
+
+def complete(known, skin):
+    """Adds landmarks {name: (before, after)} by the shape of the profile where they are not given. Returns the
+    names of those but sublabiale, and the plane of symmetry."""
+    guessed = [] if {"subnasale", "pogonion"} <= known.keys() else add_by_shape(known, skin)
+    plane = middle_plane(skin, known)
+    add_sublabiale(known, skin, plane)
+    return guessed, plane
+
+
+def add_by_shape(known, skin):
+    tip = known["pronasale"][0] if "pronasale" in known else skin.before[np.argmin(skin.before[:, 1])]
+    for aside in (0, 1.5, -1.5, 3, -3):
+        plane = np.array([tip[0] + aside, 0, 0]), np.array([1.0, 0, 0])
+        found = by_shape(cut(skin.before, skin.corners, plane)[0])
+        if found:
+            break
+    missing = [name for name in found if name not in known]
+    for name in missing:
+        known[name] = on_surface(skin.before, skin.after, skin.corners, found[name])[:2]
+    return missing
+
+
+def add_sublabiale(known, skin, plane):
+    """Adds the deepest place of the profile between lower lip and chin."""
+    points = cut(skin.before, skin.corners, plane)[0].reshape(-1, 3)
+    if "sublabiale" in known or not {"lower lip", "pogonion"} <= known.keys() or len(points) == 0:
+        return
+    lip, chin = known["lower lip"][0], known["pogonion"][0]
+    line = (chin - lip) / np.linalg.norm(chin - lip)
+    along = (points - lip) @ line
+    behind = points - lip - along[:, None] * line
+    depth = np.where((along > 0) & (along < np.linalg.norm(chin - lip)) &
+                     (np.linalg.norm(behind, axis=1) < 20), behind[:, 1], -np.inf)
+    if depth.max() > 0:
+        deepest = points[np.argmax(depth)]
+        known["sublabiale"] = on_surface(skin.before, skin.after, skin.corners, deepest)[:2]
 
 
 def cut(points, corners, plane):

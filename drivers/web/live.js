@@ -153,6 +153,7 @@ class Planner {
     if (event.key === "Escape" && this.gizmo.dragging) {
       this.gizmo.reset();
       this.dragged();
+      this.gizmo.pointerUp({button: 0});  // the pointer moves nothing until it is pressed again
     }
     if (!event.ctrlKey && !event.metaKey) return;
     if (key === "z") this.step(this.past, this.future);
@@ -422,7 +423,11 @@ class Planner {
   async saveScene() {
     const moves = Object.fromEntries([...this.pieces].map(([name, {centroid}]) =>
       [name, matrixOf(this.plan[name], centroid)]));
-    this.save("plan.yaml", await ask("/scene_file", {moves}));
+    try {
+      this.save("plan.yaml", await ask("/scene_file", {moves}));
+    } catch (error) {
+      this.mark("failed", error.message);
+    }
   }
 
   saveStl() {
@@ -443,9 +448,10 @@ class Planner {
   }
 
   async write(what) {
+    const plan = copyOf(this.plan);
     try {
-      const path = new TextDecoder().decode(await ask(what, {plan: this.plan}));
-      byId("written").textContent = `written: ${path}`;
+      const path = new TextDecoder().decode(await ask(what, {plan}));
+      byId("written").textContent = `written${isSame(plan, this.plan) ? "" : " of an earlier plan"}: ${path}`;
     } catch (error) {
       this.mark("failed", error.message);
     }
@@ -472,7 +478,8 @@ async function main() {
     setInterval(showNotice, NOTICE_TIME);
   } catch (error) {
     byId("mark").className = "failed";
-    byId("mark").textContent = error.message;
+    byId("mark").textContent = /WebGL/.test(error.message)
+      ? `this page needs a browser with WebGL 2 (${error.message})` : error.message;
   }
 }
 

@@ -529,6 +529,20 @@ def other_plan(opened, tmp_path):
     return tmp_path / "half.h5"
 
 
+def test_each_plan_has_its_own_uncertainty(report, opened, other_plan, tmp_path):
+    def state_of(*plans):
+        page_of(report, tmp_path, *plans, "-landmarks", MARKS)
+        field, = [field for field in View(tmp_path / "page.html").told["fields"] if field["name"] == "uncertainty"]
+        return [state is not None for state in field["states"]]
+
+    shutil.copy(opened, tmp_path / "sure.h5")
+    with h5py.File(tmp_path / "sure.h5", "r+") as h5:
+        step = h5["step"][sorted(h5["step"])[-1]]
+        step["point/discretisation_error"] = np.full(len(step["point/position"]), 0.4)
+    assert state_of(tmp_path / "sure.h5", other_plan) == [True, True, False]
+    assert state_of(other_plan, tmp_path / "sure.h5") == [False, False, True]
+
+
 def test_two_plans_are_compared(report, opened, other_plan, tmp_path):
     page = page_of(report, tmp_path, opened, other_plan, "-landmarks", MARKS)
     view, step, model = View(tmp_path / "page.html"), last(opened), model_of(opened)
