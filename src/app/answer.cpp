@@ -24,8 +24,12 @@ std::string describe_answer(const Job& job, const SolvedSkin& skin, const std::v
   const Mat3 axes = scene::head_axes(landmarks);
   return describe_movement(places, axes, before, now) + " " +
          describe_lips(landmarks, axes.row(2), before.points, now) +
-         describe_trust(summary, discretization) + "\n" + describe_warnings(job.warnings) +
-         describe_warnings(job.move_warnings);
+         describe_trust(summary, discretization) + "\n" + describe_warnings(job);
+}
+
+std::string describe_warnings(const Job& job) {
+  return describe_warnings(job.warnings) +
+         (job.anatomy ? describe_warnings(job.anatomy->move_warnings) : "");
 }
 
 std::string describe_folds(MPI_Comm comm, const std::filesystem::path& file,

@@ -18,6 +18,9 @@ namespace repose::app {
 std::string describe_answer(const Job& job, const SolvedSkin& skin, const std::vector<Vec3>& now,
                             const solve::Summary& summary, double discretization);
 
+/// Rows for the warnings of a job: of its input, and of its moves. On rank 0.
+std::string describe_warnings(const Job& job);
+
 /// Prisms that are inside out at the end of `summary`; `volume_ratio` is this rank's slab. The
 /// result `file` has their model. Collective.
 std::string describe_folds(MPI_Comm comm, const std::filesystem::path& file,

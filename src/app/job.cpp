@@ -71,7 +71,6 @@ void take_report(const model::ColumnGeometry& geometry, int ranks, Job& job) {
   job.building = describe_build(geometry.skin(), report);
   if (ranks > 1) job.building += report_row("built", "by {} ranks, each its part", ranks);
   job.warnings = std::move(report.warnings);
-  job.move_warnings = job.anatomy->move_warnings;
 }
 
 /// Describes the cuts that a model has, from number `first` on.

@@ -24,7 +24,6 @@ struct Job {
   bool remeshed = false;                       ///< the skin is not the given one, on all ranks
   std::string building;                        ///< what the builder has to say, on rank 0
   std::vector<std::string> warnings;           ///< about implausible input, on rank 0
-  std::vector<std::string> move_warnings;      ///< about where bones end, likewise
   std::vector<std::vector<int64_t>> held;      ///< points of each instrument, on rank 0
   std::vector<std::string> bodies;             ///< that the tissue may touch, on rank 0
   std::vector<model::Cut> cuts;                ///< on rank 0

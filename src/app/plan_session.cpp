@@ -93,7 +93,6 @@ struct PlanSession::State {
   discrete::Part& part() { return job.local_model.part; }
   void require_inside(const Placements& placements) const;
   void take(const Placements& placements);
-  scene::Scene planned() const;
   std::vector<Vec3> weights(const std::vector<std::pair<int64_t, Vec3>>& functional);
   Solved search(const Placements& placements, const solve::Settings& settings,
                 const solve::Start& start);
@@ -115,16 +114,11 @@ void PlanSession::State::take(const Placements& placements) {
   set_motions(plan, part().model);
   if (base::rank(comm) == 0) set_motions(plan, job.local_model.global_metadata);
   if (!solver) solver.emplace(comm, part(), settings);
-  for (const solve::PlanPiece& piece : plan)
-    solver->set_motion(piece.bone, scene::motion_of(piece.placement, piece.centroid));
-}
-
-/// The scene with the moves of the plan that was taken last. On rank 0.
-scene::Scene PlanSession::State::planned() const {
-  scene::Scene scene = job.anatomy->scene;
-  for (const solve::PlanPiece& piece : plan)
-    scene.moves[piece.bone] = scene::motion_of(piece.placement, piece.centroid);
-  return scene;
+  for (const solve::PlanPiece& piece : plan) {
+    const scene::RigidMotion motion = scene::motion_of(piece.placement, piece.centroid);
+    solver->set_motion(piece.bone, motion);
+    if (job.anatomy) job.anatomy->scene.moves[piece.bone] = motion;
+  }
 }
 
 /// This rank's slab of the weights of points, which rank 0 has; empty if there are none.
@@ -312,7 +306,8 @@ std::string PlanSession::write(const std::filesystem::path& name) {
   std::string text = describe_folds(s.comm, result, summary, rows.volume_ratio);
   const std::string given = write_given_skin(s.comm, s.job, name.string(), skin, now);
   base::on_root(s.comm, [&] {
-    s.job.move_warnings = model::describe_final_overlaps(s.job.anatomy->bones, s.planned());
+    model::Anatomy& anatomy = *s.job.anatomy;
+    anatomy.move_warnings = model::describe_overlaps_at_end(anatomy.bones, anatomy.scene);
     text = describe_answer(s.job, skin, now, summary, -1) + text +
            describe_failure(s.job, summary) + describe_touching(s.job, skin, now, summary) +
            report_row("result", "{}, {}_*.xdmf (ParaView)", result, name.string()) + given;

@@ -208,7 +208,7 @@ Coarser Run::solve_coarser() {
   adapt::GridSequence sequence =
       adapt::solve_sequence(comm, job_.anatomy ? *job_.anatomy : none,
                             discrete::gather_model(comm, job_.local_model), requested);
-  Coarser coarser{describe_sequence(sequence), {}, {}, false};
+  Coarser coarser{describe_sequence(sequence), {}, {}};
   const bool converging = !compare && !strategy_.preview && job_.local_model.part.solid;
   const bool last = (strategy_.preview || converging) && sequence.levels.size() > 1;
   if (sequence.near_enough || last) {
@@ -337,8 +337,8 @@ std::pair<Job, Strategy> prepare(const base::Options& options, const std::filesy
   building.end();
   stages.end("build");
   if (base::rank(comm) == 0)
-    print(job.building + describe_model(job.local_model.counts) + describe_warnings(job.warnings) +
-          describe_warnings(job.move_warnings) + strategy.explanation);
+    print(job.building + describe_model(job.local_model.counts) + describe_warnings(job) +
+          strategy.explanation);
   return {std::move(job), std::move(strategy)};
 }
 

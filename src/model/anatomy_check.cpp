@@ -49,12 +49,8 @@ bool moves(const Anatomical& head, size_t bone) {
 }
 
 std::string check_flatness(const Anatomical& head) {
-  Mat3 spread = Mat3::Zero();
-  Vec3 mean = Vec3::Zero();
-  for (const Vec3& x : head.mesh.points) mean += x;
-  mean /= static_cast<double>(head.mesh.points.size());
-  for (const Vec3& x : head.mesh.points) spread += (x - mean) * (x - mean).transpose();
-  const Vec3 squares = Eigen::SelfAdjointEigenSolver<Mat3>(spread).eigenvalues();
+  const Vec3 squares =
+      Eigen::SelfAdjointEigenSolver<Mat3>(scatter_of(head.mesh.points)).eigenvalues();
   if (squares[0] > flat * flat * squares[1] + resolution) return "";
   return "the skin is flat: it seems to be the end of a scan, not a face; give the face, or the "
          "skin of the whole head";

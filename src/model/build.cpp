@@ -27,8 +27,8 @@ Anatomy load_anatomy(const scene::Scene& scene) {
   anatomy.remarks.insert(anatomy.remarks.end(), scene.remarks.begin(), scene.remarks.end());
   anatomy.warnings.insert(anatomy.warnings.end(), scene.warnings.begin(), scene.warnings.end());
   anatomy::complete(anatomy.skin, anatomy.scene, anatomy.remarks);
-  resolve_collisions(anatomy.bones, anatomy.scene, anatomy.remarks, anatomy.warnings,
-                     anatomy.move_warnings);
+  anatomy.move_warnings =
+      resolve_collisions(anatomy.bones, anatomy.scene, anatomy.remarks, anatomy.warnings);
   if (scene.tissue.edge)
     remesh_skin(anatomy);
   else if (!given.obstacle.empty() && !replace_given_skin(anatomy, given.obstacle))

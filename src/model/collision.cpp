@@ -224,18 +224,20 @@ void report_initial_overlaps(std::vector<Mover>& movers, const scene::Scene& sce
   });
 }
 
-/// Warns of bones that move differently and end inside one another.
-void report_final_overlaps(std::vector<Mover>& movers, const scene::Scene& scene,
-                           std::vector<std::string>& warnings) {
+/// Warnings of bones that move differently and end inside one another.
+std::vector<std::string> describe_overlaps_at_end(std::vector<Mover>& movers,
+                                                  const scene::Scene& scene) {
   constexpr double limit = 1;  // mm
+  std::vector<std::string> lines;
   for_each_pair(scene, [&](size_t i, size_t j, const std::string& pair) {
     if (move_alike(movers[i].motion, movers[j].motion)) return;
     if (const double depth = overlap(movers[i], movers[j], 1).depth; depth > limit)
-      warnings.push_back(fmt::format(
+      lines.push_back(fmt::format(
           "{} end {:.1f} mm inside one another; repose-collide reports where they meet, and "
           "collision: {{mode: clamp}} moves them no farther",
           pair, depth));
   });
+  return lines;
 }
 
 /// Follows all pairs that move differently.
@@ -304,27 +306,24 @@ std::vector<std::string> describe(const CollisionReport& report, const scene::Sc
   return lines;
 }
 
-std::vector<std::string> describe_final_overlaps(const std::vector<surface::Surface>& bones,
-                                                 const scene::Scene& scene) {
+std::vector<std::string> describe_overlaps_at_end(const std::vector<surface::Surface>& bones,
+                                                  const scene::Scene& scene) {
   std::vector<Mover> movers = movers_of(bones, scene.moves);
-  std::vector<std::string> lines;
-  report_final_overlaps(movers, scene, lines);
-  return lines;
+  return describe_overlaps_at_end(movers, scene);
 }
 
-void resolve_collisions(const std::vector<surface::Surface>& bones, scene::Scene& scene,
-                        std::vector<std::string>& remarks, std::vector<std::string>& warnings,
-                        std::vector<std::string>& move_warnings) {
+std::vector<std::string> resolve_collisions(const std::vector<surface::Surface>& bones,
+                                            scene::Scene& scene, std::vector<std::string>& remarks,
+                                            std::vector<std::string>& warnings) {
   using Mode = scene::CollisionMode;
   std::vector<Mover> movers = movers_of(bones, scene.moves);
   report_initial_overlaps(movers, scene, warnings);
-  if (!scene.collision || scene.collision->mode == Mode::report)
-    report_final_overlaps(movers, scene, move_warnings);
-  if (!scene.collision) return;
+  if (!scene.collision) return describe_overlaps_at_end(movers, scene);
   const CollisionReport report = follow_all(movers, *scene.collision);
   const std::vector<std::string> lines = describe(report, scene, *scene.collision);
   remarks.insert(remarks.end(), lines.begin(), lines.end());
-  if (scene.collision->mode == Mode::report || report.safe_load >= 1) return;
+  if (scene.collision->mode == Mode::report) return describe_overlaps_at_end(movers, scene);
+  if (report.safe_load >= 1) return {};
   if (scene.collision->mode == Mode::stop) {
     const auto first =
         std::min_element(report.pairs.begin(), report.pairs.end(),
@@ -334,8 +333,8 @@ void resolve_collisions(const std::vector<surface::Surface>& bones, scene::Scene
   }
   for (scene::RigidMotion& move : scene.moves)
     move = scene::RigidMotion::from_matrix(move.matrix(report.safe_load));
-  move_warnings.push_back(fmt::format(
-      "all moves end at load {:.4f} of the plan, before the first contact", report.safe_load));
+  return {fmt::format("all moves end at load {:.4f} of the plan, before the first contact",
+                      report.safe_load)};
 }
 
 }  // namespace repose::model

@@ -52,11 +52,7 @@ void align_with_axes(HeadDirections& frame) {
 
 /// The direction in which points lie farthest from their mean: of a jaw from side to side.
 Vec3 widest_direction(const std::vector<Vec3>& points) {
-  Vec3 mean = Vec3::Zero();
-  for (const Vec3& x : points) mean += x / static_cast<double>(points.size());
-  Mat3 scatter = Mat3::Zero();
-  for (const Vec3& x : points) scatter += (x - mean) * (x - mean).transpose();
-  return Eigen::SelfAdjointEigenSolver<Mat3>(scatter).eigenvectors().col(2);
+  return Eigen::SelfAdjointEigenSolver<Mat3>(scatter_of(points)).eigenvectors().col(2);
 }
 
 /// Returns where a patch of skin faces, `outward` or the other way; nothing if it is of a cheek.
@@ -103,6 +99,14 @@ std::vector<Vec3> those(const std::vector<Vec3>& points, const Keep& keep) {
 }
 
 }  // namespace
+
+Mat3 scatter_of(const std::vector<Vec3>& points) {
+  Vec3 mean = Vec3::Zero();
+  for (const Vec3& x : points) mean += x / static_cast<double>(points.size());
+  Mat3 scatter = Mat3::Zero();
+  for (const Vec3& x : points) scatter += (x - mean) * (x - mean).transpose();
+  return scatter;
+}
 
 std::vector<BoneRole> roles_of(const scene::Scene& scene) {
   std::vector<BoneRole> roles;

@@ -26,6 +26,9 @@ struct BoneGroup {
 BoneGroup bones_of(BoneRole role, const std::vector<BoneRole>& roles,
                    const std::vector<surface::Surface>& bones);
 
+/// Returns Σ (x − m)(x − m)ᵀ of points x, mm², about their mean m.
+Mat3 scatter_of(const std::vector<Vec3>& points);
+
 /// Directions of a head, unit vectors.
 struct HeadDirections {
   Vec3 up, forward, left;  ///< along axes of the coordinates

@@ -176,7 +176,7 @@ CASES = {
     "distance zero": (
         lambda p: None, ["repose-decimate", "fixed.ply", "-distance", "0"], ["-distance", "> 0"]),
     "distance below rounding": (
-        lambda p: None, ["repose-decimate", "fixed.ply", "-distance", "1e-12"], ["fixed.ply", "1e-12 mm", "or more"]),
+        lambda p: None, ["repose-decimate", "fixed.ply", "-distance", "1e-12"], ["fixed.ply: -distance", "or more", "1e-12 mm"]),
     "two landmarks only": (
         lambda p: spoil(p, p.landmarks[:2]), REGISTER, ["2 landmark", "three"]),
     "landmarks on a line": (

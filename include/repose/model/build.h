@@ -44,9 +44,9 @@ struct Anatomy {
   /// The skin that the scene names, where another is solved in its place (solved_skin.h).
   std::optional<surface::Surface> given_skin;
   std::vector<surface::Surface> bones;          ///< [scene.bones]
-  std::vector<std::string> remarks;             ///< lines for a person, each complete
-  std::vector<std::string> warnings;            ///< implausible properties, a line each
-  std::vector<std::string> move_warnings = {};  ///< likewise, of where the scene's moves end
+  std::vector<std::string> remarks;             ///< one line each
+  std::vector<std::string> warnings;            ///< implausible properties, one line each
+  std::vector<std::string> move_warnings = {};  ///< of the scene's moves (collision.h)
 };
 
 /// Reads the scene's surfaces, cuts its bones and resolves collisions. Serial.

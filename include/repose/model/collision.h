@@ -39,18 +39,18 @@ CollisionReport follow_moves(const std::vector<surface::Surface>& bones,
                              const std::vector<scene::RigidMotion>& moves,
                              const scene::Collision& requested);
 
-/// Resolves contacts as the scene requests: moves are shortened, of which a warning is added, and a
-/// remark on each pair. Adds warnings for bones that lie more than 2 mm inside one another before
-/// all moves and, to those of the moves, where none is shortened, for those that end more than 1 mm
-/// so. Throws InputError naming the scene and the first contact in mode stop.
-void resolve_collisions(const std::vector<surface::Surface>& bones, scene::Scene& scene,
-                        std::vector<std::string>& remarks, std::vector<std::string>& warnings,
-                        std::vector<std::string>& move_warnings);
+/// Resolves contacts as the scene requests: shortens moves, and adds a remark on each pair. Adds
+/// warnings of bones that lie more than 2 mm inside one another before all moves. Returns warnings
+/// of the moves: that they are shortened, or as describe_overlaps_at_end(). Throws InputError
+/// naming the scene and the first contact in mode stop.
+std::vector<std::string> resolve_collisions(const std::vector<surface::Surface>& bones,
+                                            scene::Scene& scene, std::vector<std::string>& remarks,
+                                            std::vector<std::string>& warnings);
 
-/// Returns a line for each pair of bones that move differently and end more than 1 mm inside one
+/// Returns a warning of each pair of bones that move differently and end more than 1 mm inside one
 /// another.
-std::vector<std::string> describe_final_overlaps(const std::vector<surface::Surface>& bones,
-                                                 const scene::Scene& scene);
+std::vector<std::string> describe_overlaps_at_end(const std::vector<surface::Surface>& bones,
+                                                  const scene::Scene& scene);
 
 /// One line a pair, for a person.
 std::vector<std::string> describe(const CollisionReport& report, const scene::Scene& scene,

@@ -81,9 +81,9 @@ Decimated decimate(const Surface& surface, const DecimateOptions& options,
   const double least = least_share * bounding_diagonal(surface.points);
   if (options.distance < least)
     base::refuse(
-        "{}: -distance {} mm is less than {:.1g} mm, to which distances in a mesh this large "
-        "are known; allowed are {:.1g} mm or more",
-        surface.name, options.distance, least, least);
+        "{}: -distance must be {:.1g} mm or more, to which distances in a mesh this large are "
+        "known; it is {} mm",
+        surface.name, least, options.distance);
   Decimated decimated;
   std::vector<char> locked = border_vertices(EdgeTable(surface.triangles), surface.points.size());
   for (const Vec3& landmark : options.landmarks) {

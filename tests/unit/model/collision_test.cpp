@@ -35,6 +35,15 @@ scene::Scene scene_of(const std::vector<surface::Surface>& bones,
 const std::vector<surface::Surface> jaws = {box("upper", {0, 0, 40}, {50, 50, 30}),
                                             box("lower", {0, 5, 0}, {50, 40, 30})};
 
+/// All warnings of a scene, whose contacts are resolved.
+std::vector<std::string> warnings_of(const std::vector<surface::Surface>& bones,
+                                     scene::Scene& scene, std::vector<std::string>& remarks) {
+  std::vector<std::string> warnings;
+  const std::vector<std::string> of_moves = resolve_collisions(bones, scene, remarks, warnings);
+  warnings.insert(warnings.end(), of_moves.begin(), of_moves.end());
+  return warnings;
+}
+
 TEST(Collisions, a_translation_stops_where_the_gap_is_used_up) {
   const std::vector<RigidMotion> moves = {{}, RigidMotion::translation({3, 0, 16})};
   for (const double clearance : {0.0, 1.0})
@@ -125,8 +134,8 @@ TEST(Collisions, a_bone_inside_another_overlaps_it) {
   for (const surface::Surface& bone : {inner, parts})
     for (const std::vector<surface::Surface>& bones : {std::vector{outer, bone}, {bone, outer}}) {
       scene::Scene scene = scene_of(bones, moves);
-      std::vector<std::string> remarks, warnings;
-      resolve_collisions(bones, scene, remarks, warnings, warnings);
+      std::vector<std::string> remarks;
+      const std::vector<std::string> warnings = warnings_of(bones, scene, remarks);
       ASSERT_EQ(warnings.size(), 2u);
       EXPECT_NE(warnings[0].find("lie 10.0 mm inside one another before they move"),
                 std::string::npos)
@@ -166,8 +175,8 @@ TEST(Collisions, clamp_shortens_all_moves_alike) {
   scene::Scene scene =
       scene_of(jaws, {RigidMotion::translation({4, 0, 0}), RigidMotion::translation({0, 0, 20})});
   scene.collision = scene::Collision{scene::CollisionMode::clamp, 0.5, 0.01};
-  std::vector<std::string> remarks, warnings;
-  resolve_collisions(jaws, scene, remarks, warnings, warnings);
+  std::vector<std::string> remarks;
+  std::vector<std::string> warnings = warnings_of(jaws, scene, remarks);
   const Vec3 lower = scene.moves[1].apply(Vec3::Zero()), upper = scene.moves[0].apply(Vec3::Zero());
   EXPECT_LE(lower.z(), 9.5);
   EXPECT_GE(lower.z(), 9.49 - 1e-3);
@@ -179,19 +188,17 @@ TEST(Collisions, clamp_shortens_all_moves_alike) {
 
 TEST(Collisions, report_and_none_change_nothing) {
   scene::Scene scene = scene_of(jaws, {{}, RigidMotion::translation({8, 0, 20})});
-  std::vector<std::string> remarks, warnings;
-  resolve_collisions(jaws, scene, remarks, warnings, warnings);
+  std::vector<std::string> remarks;
+  std::vector<std::string> warnings = warnings_of(jaws, scene, remarks);
   ASSERT_EQ(warnings.size(), 1u);
   const std::string overlap = "bones 'upper' and 'lower' end 10.0 mm inside one another";
   EXPECT_EQ(warnings[0].find(overlap), 0u) << warnings[0];
   scene.moves[1] = RigidMotion::translation({8, 0, 10.9});
-  warnings.clear();
-  resolve_collisions(jaws, scene, remarks, warnings, warnings);
-  EXPECT_TRUE(warnings.empty());
+  EXPECT_TRUE(warnings_of(jaws, scene, remarks).empty());
   EXPECT_TRUE(remarks.empty());
   scene.moves[1] = RigidMotion::translation({8, 0, 20});
   scene.collision = scene::Collision{};
-  resolve_collisions(jaws, scene, remarks, warnings, warnings);
+  warnings = warnings_of(jaws, scene, remarks);
   ASSERT_EQ(warnings.size(), 1u);
   EXPECT_EQ(warnings[0].find(overlap), 0u) << warnings[0];
   EXPECT_EQ(scene.moves[1].apply(Vec3::Zero()).z(), 20);
@@ -216,9 +223,9 @@ TEST(Collisions, overlapping_bones_are_said_to_lie_deeper) {
 TEST(Collisions, stop_refuses_the_scene) {
   scene::Scene scene = scene_of(jaws, {{}, RigidMotion::translation({0, 0, 20})});
   scene.collision = scene::Collision{scene::CollisionMode::stop, 0, 0.05};
-  std::vector<std::string> remarks, warnings;
+  std::vector<std::string> remarks;
   try {
-    resolve_collisions(jaws, scene, remarks, warnings, warnings);
+    warnings_of(jaws, scene, remarks);
     FAIL() << "accepted";
   } catch (const base::InputError& error) {
     const std::string why = error.what();
@@ -226,7 +233,7 @@ TEST(Collisions, stop_refuses_the_scene) {
     EXPECT_EQ(why.find('\n'), std::string::npos);
   }
   scene.moves[1] = RigidMotion::translation({0, 0, 5});
-  resolve_collisions(jaws, scene, remarks, warnings, warnings);
+  warnings_of(jaws, scene, remarks);
 }
 
 }  // namespace collision_test
