@@ -195,19 +195,18 @@ class Handler(http.server.BaseHTTPRequestHandler):
 
     def result(self, request):
         with self.server.writing:
-            return self.write(request["plan"])[1].encode()
+            return f"{self.write(request['plan'])}.h5".encode()
 
     def write(self, plan):
-        """Writes the result of a plan: its path without ending, and what the page says of it."""
+        """Writes the result of a plan. Returns its path without ending."""
         name = self.server.scene.with_name(self.server.scene.stem + "_plan")
-        count = sum(line.startswith(("NOT", "FOLDED")) or line.split()[:1] == ["warning"]
-                    for line in self.server.session.write(name, plan).splitlines())
-        return name, f"{name}.h5" + (f"; its sheet has {count} warning{'s'[:count - 1]}" if count else "")
+        self.server.session.write(name, plan)
+        return name
 
     def report(self, request):
         """Writes the result and its planning sheet."""
         with self.server.writing:
-            name, _ = self.write(request["plan"])
+            name = self.write(request["plan"])
             done = subprocess.run([sys.executable, HERE / "report.py", name, "-output", f"{name}.html", "-scene",
                                    self.server.scene], capture_output=True, text=True)
         if done.returncode != 0:

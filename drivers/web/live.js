@@ -478,8 +478,7 @@ async function main() {
     setInterval(showNotice, NOTICE_TIME);
   } catch (error) {
     byId("mark").className = "failed";
-    byId("mark").textContent = /WebGL/.test(error.message)
-      ? `this page needs a browser with WebGL 2 (${error.message})` : error.message;
+    byId("mark").textContent = error.message;
   }
 }
 

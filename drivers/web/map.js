@@ -293,8 +293,7 @@ async function main() {
     document.documentElement.dataset.ready = "1";
   } catch (error) {
     byId("mark").className = "failed";
-    byId("mark").textContent = /WebGL/.test(error.message)
-      ? `this page needs a browser with WebGL 2 (${error.message})` : error.message;
+    byId("mark").textContent = error.message;
     document.documentElement.dataset.ready = "1";
   }
 }

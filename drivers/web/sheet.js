@@ -241,8 +241,7 @@ class Sheet {
     sheet.makeStills();
   } catch (reason) {
     bySheetId("no-view").hidden = false;
-    bySheetId("no-view").textContent =
-      `The view to turn needs a browser with WebGL 2 (${reason.message}).`;
+    bySheetId("no-view").textContent = reason.message;
     document.documentElement.dataset.ready = "failed";
   }
 })();

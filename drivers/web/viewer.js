@@ -148,14 +148,21 @@ class FaceSurface {
   }
 }
 
+function makeRenderer() {
+  try {
+    return new THREE.WebGLRenderer({antialias: true, alpha: true, preserveDrawingBuffer: true});
+  } catch (reason) {
+    throw new Error(`The view to turn needs a browser with WebGL 2 (${reason.message}).`);
+  }
+}
+
 class FaceViewer {
   static MIXED = 9;  // the state that mix() fills
 
   constructor(element, axes = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]) {
     Object.assign(this, {element, axes});
     element.classList.add("face-viewer");
-    const renderer = new THREE.WebGLRenderer({antialias: true, alpha: true,
-                                              preserveDrawingBuffer: true});
+    const renderer = makeRenderer();
     const scene = new THREE.Scene(), camera = new THREE.OrthographicCamera(-1, 1, 1, -1, 1, 4000);
     camera.up.set(...axes[2]);
     element.append(renderer.domElement);

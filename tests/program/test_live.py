@@ -218,7 +218,7 @@ def test_a_full_result_holds_a_summary_of_its_own_plan(session, tmp_path):
     assert "inside one another" not in session.write(tmp_path / "plan")
 
 
-def test_the_result_of_a_plan_has_its_own_bones_after_one_that_was_abandoned(session, run, tmp_path):
+def test_the_result_of_a_plan_has_its_own_bones_after_one_that_was_abandoned(session, tmp_path):
     session.solve(B)
     session.write(tmp_path / "before")
 

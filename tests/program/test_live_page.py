@@ -8,12 +8,16 @@ import subprocess
 import sys
 import tempfile
 import threading
+import types
 import urllib.error
 import urllib.request
 
+import meshio
+import numpy as np
 import pytest
 from browser import CHROMIUM, FOUND, OPTIONS, needs_browser
 from conftest import PROJECT, programs
+from scipy.spatial.transform import Rotation
 
 sys.path.insert(0, str(PROJECT / "drivers/python"))
 import repose  # noqa: E402
@@ -182,6 +186,23 @@ def served(live, environment):
         server.shutdown()
         thread.join()
         server.server_close()
+
+
+def test_angles_are_those_of_the_head_in_any_pose(live, tmp_path):
+    skin = meshio.read(PROJECT / "meshes/head_skin.ply")
+    marks = json.loads((PROJECT / "meshes/head_landmarks.json").read_text())
+    moved, found = skin.points - np.outer(skin.points[:, 2] < -45, [0, 4, 0]), []
+    for turn in (np.eye(3), Rotation.from_euler("xyz", [-10, 12, 20], degrees=True).as_matrix()):
+        (tmp_path / "marks.json").write_text(json.dumps(
+            {name: list(turn @ place) if isinstance(place, list) else place for name, place in marks.items()}))
+        (tmp_path / "scene.yaml").write_text("landmarks: marks.json\n")
+        session = types.SimpleNamespace(initial=skin.points @ turn.T, triangles=skin.cells_dict["triangle"], axes=turn.T)
+        angles = live.ProfileAngles(tmp_path / "scene.yaml", session).of(moved @ turn.T)
+        found.append({angle["name"]: (angle["before"], angle["after"]) for angle in angles})
+    assert found[0].keys() == found[1].keys() and len(found[0]) >= 3
+    for name, values in found[0].items():
+        assert np.allclose(values, found[1][name], atol=0.01), name
+    assert abs(np.subtract(*found[0]["facial convexity"])) > 1
 
 
 def status(address, path, headers=None, content=None):
