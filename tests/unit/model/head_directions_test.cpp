@@ -37,7 +37,7 @@ TEST(HeadDirections, AClosedSkinLeavesThemToTheBones) {
 TEST(HeadDirections, ASkullBeforeItsJawLeavesThemOpen) {
   const Mat3 same = Mat3::Identity();
   BoneGroup skull = bone("head_skull.ply", same);
-  for (Vec3& x : skull.points) x.y() -= 80;
+  for (Vec3& x : skull.points) x.y() -= 60;
   skull.box = surface::bounding_box(skull.points);
   EXPECT_FALSE(head_directions(make_skin_mesh(patches::sphere(150, 3)), skull,
                                bone("head_mandible.ply", same)));
