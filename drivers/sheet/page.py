@@ -296,7 +296,7 @@ def ratio_table(plans):
                 plan.known, plan.bones, plan.result):
             label = f"{skin} to {bone}, {direction}"
             rows.append((label if len(plans) == 1 else f"{plan.name}: {label}", tenths(soft),
-                         tenths(hard), Figure(f"{share:.0f} %"),
+                         tenths(hard), Figure(f"{share:.0f} %".replace("-", "−")),
                          Figure("{}–{} %".format(*published)) if published else "–"))
     if not rows:
         return '<p class="note">No soft-to-hard ratio: none of the bones under subnasale, lips and ' \

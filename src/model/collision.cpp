@@ -203,39 +203,27 @@ std::vector<Mover> movers_of(const std::vector<surface::Surface>& bones,
   return movers;
 }
 
-/// Calls visit(i, j, "bones 'NAME' and 'NAME'") for all pairs.
+/// Calls visit("bones 'NAME' and 'NAME'", mm) for pairs that lie deeper than `limit` (mm) in one
+/// another before all moves (load 0), or at their end if they move differently (load 1).
 template <class Visit>
-void for_each_pair(const scene::Scene& scene, Visit&& visit) {
-  for (size_t i = 0; i < scene.bones.size(); ++i)
-    for (size_t j = i + 1; j < scene.bones.size(); ++j)
-      visit(i, j, fmt::format("bones '{}' and '{}'", scene.bones[i].name, scene.bones[j].name));
+void for_each_overlap(std::vector<Mover>& movers, const scene::Scene& scene, double load,
+                      double limit, Visit&& visit) {
+  for (size_t i = 0; i < movers.size(); ++i)
+    for (size_t j = i + 1; j < movers.size(); ++j) {
+      if (load > 0 && move_alike(movers[i].motion, movers[j].motion)) continue;
+      if (const double depth = overlap(movers[i], movers[j], load).depth; depth > limit)
+        visit(fmt::format("bones '{}' and '{}'", scene.bones[i].name, scene.bones[j].name), depth);
+    }
 }
 
-/// Warns of bones that lie inside others before all moves.
-void report_initial_overlaps(std::vector<Mover>& movers, const scene::Scene& scene,
-                             std::vector<std::string>& warnings) {
-  constexpr double limit = 2;  // mm: segmented teeth overlap by tenths
-  for_each_pair(scene, [&](size_t i, size_t j, const std::string& pair) {
-    if (const double depth = overlap(movers[i], movers[j], 0).depth; depth > limit)
-      warnings.push_back(fmt::format(
-          "{} lie {:.1f} mm inside one another before they move: check that both come from one "
-          "scan and in one frame, or separate their segmentations",
-          pair, depth));
-  });
-}
-
-/// Warnings of bones that move differently and end inside one another.
 std::vector<std::string> describe_overlaps_at_end(std::vector<Mover>& movers,
                                                   const scene::Scene& scene) {
-  constexpr double limit = 1;  // mm
   std::vector<std::string> lines;
-  for_each_pair(scene, [&](size_t i, size_t j, const std::string& pair) {
-    if (move_alike(movers[i].motion, movers[j].motion)) return;
-    if (const double depth = overlap(movers[i], movers[j], 1).depth; depth > limit)
-      lines.push_back(fmt::format(
-          "{} end {:.1f} mm inside one another; repose-collide reports where they meet, and "
-          "collision: {{mode: clamp}} moves them no farther",
-          pair, depth));
+  for_each_overlap(movers, scene, 1, 1, [&](const std::string& pair, double depth) {
+    lines.push_back(fmt::format(
+        "{} end {:.1f} mm inside one another; repose-collide reports where they meet, and "
+        "collision: {{mode: clamp}} moves them no farther",
+        pair, depth));
   });
   return lines;
 }
@@ -317,7 +305,13 @@ std::vector<std::string> resolve_collisions(const std::vector<surface::Surface>&
                                             std::vector<std::string>& warnings) {
   using Mode = scene::CollisionMode;
   std::vector<Mover> movers = movers_of(bones, scene.moves);
-  report_initial_overlaps(movers, scene, warnings);
+  constexpr double known = 2;  // mm: segmented teeth overlap by tenths
+  for_each_overlap(movers, scene, 0, known, [&](const std::string& pair, double depth) {
+    warnings.push_back(fmt::format(
+        "{} lie {:.1f} mm inside one another before they move: check that both come from one "
+        "scan and in one frame, or separate their segmentations",
+        pair, depth));
+  });
   if (!scene.collision) return describe_overlaps_at_end(movers, scene);
   const CollisionReport report = follow_all(movers, *scene.collision);
   const std::vector<std::string> lines = describe(report, scene, *scene.collision);
