@@ -88,6 +88,15 @@ std::vector<ProfilePoint> between(const std::vector<ProfilePoint>& profile, doub
   return inside;
 }
 
+ProfilePoint at_height(const std::vector<ProfilePoint>& profile, double z) {
+  const auto height_of = [](const ProfilePoint& p) { return p.y(); };
+  const double height = std::clamp(z, profile.front().y(), profile.back().y());
+  const auto above = std::ranges::lower_bound(profile, height, {}, height_of);
+  if (above == profile.begin()) return *above;
+  const ProfilePoint low = *std::prev(above), rise = *above - low;
+  return low + (height - low.y()) / rise.y() * rise;
+}
+
 std::optional<ProfilePoint> farthest_from_chord(const std::vector<ProfilePoint>& profile,
                                                 const ProfilePoint& a, const ProfilePoint& b,
                                                 int sign, double flat) {
@@ -96,12 +105,7 @@ std::optional<ProfilePoint> farthest_from_chord(const std::vector<ProfilePoint>&
   const ProfilePoint ahead(-along.y(), along.x());  // to the left of upwards: in front
   const auto distance = [&](const ProfilePoint& p) { return sign * ahead.dot(p - a); };
   const auto height_of = [](const ProfilePoint& p) { return p.y(); };
-  const double height = std::clamp(mean_near_largest(profile, flat, distance, height_of),
-                                   profile.front().y(), profile.back().y());
-  const auto above = std::ranges::lower_bound(profile, height, {}, height_of);
-  if (above == profile.begin()) return *above;
-  const ProfilePoint low = *std::prev(above), rise = *above - low;
-  return low + (height - low.y()) / rise.y() * rise;
+  return at_height(profile, mean_near_largest(profile, flat, distance, height_of));
 }
 
 std::optional<ProfilePoint> foremost_of(const std::vector<ProfilePoint>& profile) {
@@ -117,6 +121,17 @@ std::optional<ProfilePoint> chin_of(const std::vector<ProfilePoint>& profile, do
   const ProfilePoint rise = inside.back() - inside.front();
   const double share = std::max(1 - (inside.back().y() - foremost->y()) / end, 0.0);
   return farthest_from_chord(inside, {0, 0}, {share * rise.x() / rise.y(), 1}, 1, flat);
+}
+
+std::optional<ProfilePoint> b_point_of(const std::vector<ProfilePoint>& profile,
+                                       const ProfilePoint& pogonion, const ProfilePoint& edge,
+                                       double usual) {
+  constexpr double concave = 1;  // mm
+  const auto deepest = farthest_from_chord(profile, pogonion, edge, -1);
+  if (!deepest) return deepest;
+  const ProfilePoint up = (edge - pogonion).normalized(), way = *deepest - pogonion;
+  const double share = std::clamp((way.x() * up.y() - way.y() * up.x()) / concave, 0.0, 1.0);
+  return at_height(profile, usual + share * (deepest->y() - usual));
 }
 
 }  // namespace repose::anatomy

@@ -44,6 +44,8 @@ class FrontMap {
 /// Returns the points of a profile between two heights.
 std::vector<ProfilePoint> between(const std::vector<ProfilePoint>& profile, double from_z,
                                   double to_z);
+/// The point of a profile, which has points, at the height `z`, or at its end nearest to that.
+ProfilePoint at_height(const std::vector<ProfilePoint>& profile, double z);
 /// The point of a profile that lies farthest in front of the line through `a` and `b` (behind it
 /// with sign −1), of a flat stretch its middle: the mean of heights, weighted with what the
 /// distance is above the largest less `flat` mm. Nothing where the profile has no point.
@@ -57,5 +59,11 @@ std::optional<ProfilePoint> foremost_of(const std::vector<ProfilePoint>& profile
 /// toward the chord between the ends, the more the nearer.
 std::optional<ProfilePoint> chin_of(const std::vector<ProfilePoint>& profile, double from_z,
                                     double to_z);
+/// Point B: the deepest of a profile behind the chord from pogonion to the lower incisors' edge.
+/// Less than 1 mm behind it, the nearer to the `usual` height the less, which decides where the
+/// profile is not concave. Nothing where the profile has no point.
+std::optional<ProfilePoint> b_point_of(const std::vector<ProfilePoint>& profile,
+                                       const ProfilePoint& pogonion, const ProfilePoint& edge,
+                                       double usual);
 
 }  // namespace repose::anatomy

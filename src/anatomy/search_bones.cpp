@@ -66,6 +66,7 @@ double middle_of_chin(const FrontMap& map, double low) {
 
 /// Pogonion and point B, on the profile at x = `aside`, after menton and the lower incisors.
 void search_chin(const std::vector<ProfilePoint>& profile, double aside, Search& search) {
+  constexpr double usual = 0.53;  // of the height of the jaw with teeth, of B above menton
   const ProfilePoint edge = *search.profile_point("lower_incisor_edge");
   const double menton = search.find("menton_bone")->z(), height = edge.y() - menton;
   if (height < scene::lower_jaw_with_teeth)
@@ -76,10 +77,9 @@ void search_chin(const std::vector<ProfilePoint>& profile, double aside, Search&
   search.put("pogonion_bone", chin_of(profile, menton, menton + 0.45 * height), "no chin", aside);
   const ProfilePoint pogonion = *search.profile_point("pogonion_bone");
   const double lowest = std::max(pogonion.y() + 0.1 * height, menton + 0.35 * height);
-  search.put(
-      "b_point",
-      farthest_from_chord(between(profile, lowest, edge.y() - 0.2 * height), pogonion, edge, -1),
-      "no bone between pogonion and the lower incisors", aside);
+  const std::vector<ProfilePoint> above = between(profile, lowest, edge.y() - 0.2 * height);
+  search.put("b_point", b_point_of(above, pogonion, edge, menton + usual * height),
+             "no bone between pogonion and the lower incisors", aside);
 }
 
 void search_symphysis(const FrontMap& map, const ScanEnd& end, Search& search) {

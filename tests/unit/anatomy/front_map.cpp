@@ -71,5 +71,21 @@ TEST(FrontMap, OfAFlatValleyTheMiddleIsTaken) {
   EXPECT_FALSE(farthest_from_chord({}, {0, 0}, {0, 31}, -1));
 }
 
+TEST(FrontMap, PointBIsTheDeepestWhereTheProfileIsConcaveAndAtTheUsualHeightWhereNot) {
+  const ProfilePoint pogonion(0, 0), edge(-10, 30);
+  const auto with_depth = [&](double depth) {
+    std::vector<ProfilePoint> profile;
+    for (double z = 4; z <= 26; z += 0.5)
+      profile.emplace_back(-z / 3 + depth * std::exp(-std::pow((z - 8) / 3, 2)), z);
+    return b_point_of(profile, pogonion, edge, 17)->y();
+  };
+  EXPECT_NEAR(with_depth(3), 8, 0.5);
+  EXPECT_NEAR(with_depth(0), 17, 1e-9);
+  EXPECT_NEAR(with_depth(-1), 17, 1e-9);
+  for (double depth = 0; depth < 2; depth += 0.01)
+    EXPECT_LT(std::abs(with_depth(depth + 0.01) - with_depth(depth)), 1) << depth;
+  EXPECT_FALSE(b_point_of({}, pogonion, edge, 17));
+}
+
 }  // namespace
 }  // namespace repose::anatomy
