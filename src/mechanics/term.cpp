@@ -5,6 +5,7 @@
 #include <map>
 
 #include "adhesion.h"
+#include "elastic_support.h"
 #include "repose/base/error.h"
 
 namespace repose::mechanics {
@@ -15,6 +16,7 @@ std::map<std::string, std::unique_ptr<const Term>>& known_terms() {
   static std::map<std::string, std::unique_ptr<const Term>> terms = [] {
     std::map<std::string, std::unique_ptr<const Term>> built_in;
     built_in["adhesion"] = std::make_unique<DifferentiatedTerm<Adhesion>>();
+    built_in["elastic_support"] = std::make_unique<DifferentiatedTerm<ElasticSupport>>();
     return built_in;
   }();
   return terms;

@@ -112,7 +112,8 @@ void add_adhesion(const scene::AnatomyPlan& plan, const std::vector<surface::Sur
 std::string remark_on_adhesion(const scene::Scene& scene, const Model& model) {
   if (!adheres(scene)) return "";
   size_t points = 0;
-  for (const TermElements& elements : model.elements) points += elements.size();
+  for (const TermElements& elements : model.elements)
+    if (elements.term == "adhesion") points += elements.size();
   return fmt::format(
       "adhesion by landmarks: {} points of the lips adhere to teeth with up to {:g} N/mm²", points,
       scene.anatomy->adhesion);

@@ -2,6 +2,7 @@
 
 #include "add_adhesion.h"
 #include "add_contact.h"
+#include "add_supports.h"
 #include "column_layout.h"
 #include "cut_sides.h"
 #include "layers.h"
@@ -171,7 +172,8 @@ Piece ColumnGeometry::piece(const std::vector<int64_t>& columns) const {
   }
   const ColumnEnds& ends = layout.attachment;
   piece.ends = {base::pick(ends.bone, piece.column), base::pick(ends.slides_on, piece.column),
-                base::pick(ends.free, piece.column)};
+                base::pick(ends.free, piece.column), base::pick(ends.support, piece.column),
+                base::pick(ends.support_stiffness, piece.column)};
   const ColumnLoads& loads = state_->loads;
   piece.loads = {base::pick(loads.instrument, piece.column), base::pick(loads.target, piece.column),
                  base::pick(loads.force, piece.column), loads.layer_area};
@@ -236,6 +238,7 @@ Model build_local(const scene::Scene& scene, const std::vector<surface::Surface>
   }
   add_contact(scene, mesh, piece.ends, model);
   if (!piece.jaws.empty()) add_adhesion(*scene.anatomy, bones, piece, model);
+  if (solid) add_supports(piece.ends, scene.tissue.material->deep.young, mesh, model);
   for (int64_t& column : model.points.column) column = piece.column[column];
   return model;
 }

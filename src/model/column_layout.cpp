@@ -52,19 +52,24 @@ std::vector<double> pedicles(const scene::Scene& scene) {
   return shares;
 }
 
+/// Share of the release distance on both sides of which a solid is supported elastically. The
+/// paper's functionals know no such support, so that columns of springs are held or released.
+double release_band(const scene::Scene& scene) { return scene.tissue.material ? 0.4 : 0; }
+
 /// Releases tissue near pieces that move differently, and reports where the pedicle limits it.
 void release_from_bones(const scene::Scene& scene, const MotionRange& range, ColumnLayout& layout) {
   const double distance = scene.tissue.release;
   const std::vector<double> pedicle = pedicles(scene);
   const std::vector<double> limits = release_near_other_pieces(
       layout.columns.deep, layout.field, range,
-      {distance, scene.tissue.released, pedicle, layout.mesh.vertex_area}, layout.attachment);
+      {distance, scene.tissue.released, release_band(scene), pedicle, layout.mesh.vertex_area},
+      layout.attachment);
   for (size_t b = 0; b < limits.size(); ++b)
     if (limits[b] < distance)
       layout.attachment.remarks.push_back(fmt::format(
           "pedicle by landmarks: tissue on '{}' is released within {:.1f} in place of {:g} mm of "
           "other pieces, so that {:g} % of it stays attached",
-          scene.bones[b].name, std::max(limits[b], 0.0), distance, 100 * pedicle[b]));
+          scene.bones[b].name, limits[b], distance, 100 * pedicle[b]));
 }
 
 /// Chooses the columns that are held as the rim; those released from bone, as do those near other
@@ -75,7 +80,7 @@ void settle_rim(const scene::Scene& scene, const MotionRange& range, ColumnLayou
   rim = rim_columns(layout.mesh, scene.rim != scene::Rim::free);
   const auto let_go = [&] {
     for (size_t c = 0; c < rim.size(); ++c)
-      if (rim[c]) attachment.bone[c] = attachment.slides_on[c] = -1;
+      if (rim[c]) attachment.bone[c] = attachment.slides_on[c] = attachment.support[c] = -1;
   };
   if (scene.rim == scene::Rim::fixed) let_go();
   const std::vector<int32_t> sliding = attachment.slides_on;
@@ -117,7 +122,15 @@ ColumnLayout lay_out_columns(const scene::Scene& scene, const surface::Surface& 
       !border.empty())
     (scene.rim == scene::Rim::fixed ? report.warnings : report.remarks).push_back(border);
   release_near_rim(layout.columns.deep, layout.rim, range,
-                   {scene.tissue.release, scene.tissue.released}, layout.attachment);
+                   {scene.tissue.release, scene.tissue.released, release_band(scene)},
+                   layout.attachment);
+  if (const auto supported =
+          std::ranges::count_if(layout.attachment.support, [](int32_t bone) { return bone >= 0; });
+      supported > 0)
+    layout.attachment.remarks.push_back(
+        fmt::format("{} of the released columns are supported elastically: they end about as far "
+                    "from other pieces as tissue is released",
+                    supported));
   return layout;
 }
 

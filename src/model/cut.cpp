@@ -5,6 +5,7 @@
 #include <set>
 
 #include "add_contact.h"
+#include "add_supports.h"
 #include "cut_sides.h"
 #include "repose/model/material.h"
 
@@ -204,6 +205,7 @@ void add_skin_around(const std::vector<Vec3>& points, const std::vector<Triangle
 std::vector<std::array<int64_t, 2>> cut_along(const Cut& cut, Model& model) {
   std::vector<std::array<int64_t, 2>> pairs = CutSplitter(cut, model).run();
   share_pairs(pairs, model);
+  share_supports(pairs, model);
   if (cut.meets) add_cut_faces(cut, pairs, model);
   return pairs;
 }

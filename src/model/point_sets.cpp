@@ -80,7 +80,7 @@ void require_held(const scene::Scene& scene, const SkinMesh& mesh, const BoneFie
                   const Counts& counts, Attachment& attachment) {
   const std::string file = scene.file.string();
   std::vector<int64_t> tied(bones.size(), 0);
-  for (const auto* bones_of : {&attachment.bone, &attachment.slides_on})
+  for (const auto* bones_of : {&attachment.bone, &attachment.slides_on, &attachment.support})
     for (const int32_t bone : *bones_of)
       if (bone >= 0) ++tied[bone];
   const bool touching =

@@ -28,18 +28,42 @@ double releasing_distance(const Vec3& point, int32_t own, const BoneField& bones
   return least;
 }
 
-/// Largest of ascending `columns` (releasing distance and area of each) up to which columns lie
-/// with no more than `share` of the whole area; negative if there is none.
+/// Releasing distance at which columns (releasing distance and area of each) that lie nearer, in
+/// ascending order, have no more than `share` of the whole area; infinite where that is all of
+/// them. It is continuous in their distances.
 double distance_of_share(const std::vector<std::array<double, 2>>& columns, double share) {
-  double whole = 0;
+  double whole = 0, within = 0;
   for (const auto& [distance, area] : columns) whole += area;
-  double within = 0, below = -1;  // `below` of those as far as the present one, which go together
-  for (size_t k = 0; k < columns.size(); ++k) {
-    if (k > 0 && columns[k - 1][0] < columns[k][0]) below = columns[k - 1][0];
-    within += columns[k][1];
-    if (within > share * whole) return below;
+  if (!(share > 0)) return 0;
+  for (const auto& [distance, area] : columns) {
+    within += area;
+    if (within > share * whole) return distance;
   }
-  return columns.empty() ? -1 : columns.back()[0];
+  return INFINITY;
+}
+
+/// Share, 0 to 1, by which tissue whose releasing distance is `releasing` mm is held where it is
+/// released up to `limit` mm, with the band on both sides of it as a share of that.
+double held_share(double releasing, double limit, double band) {
+  if (!(limit > 0) || !(band > 0)) return releasing < limit ? 0 : 1;
+  return std::clamp((releasing / limit - 1 + band) / (2 * band), 0.0, 1.0);
+}
+
+/// Lets go of a column but for the share `held`: by an elastic support that is rigid at 1 and
+/// vanishes at 0.
+void release_column(size_t column, double held, scene::Attach how, Attachment& attachment) {
+  constexpr double negligible = 1e-4;
+  if (held > 1 - negligible || how == scene::Attach::fixed) return;
+  const double stiffness = held / (1 - held);
+  if (attachment.bone[column] >= 0) {
+    ++attachment.released;
+    attachment.support[column] = attachment.bone[column];
+    attachment.support_stiffness[column] = stiffness;
+    attachment.settle(column, how);
+  }
+  double& support = attachment.support_stiffness[column];
+  support = std::min(support, stiffness);
+  if (support < negligible) attachment.support[column] = -1;
 }
 
 /// Release distance of each bone, mm: release.distance, or less where that leaves less than the
@@ -73,12 +97,10 @@ std::vector<double> release_near_other_pieces(const std::vector<Vec3>& deep, con
       releasing[v] = releasing_distance(deep[v], attachment.bone[v], bones, range);
   const std::vector<double> limits =
       distances_of_bones(releasing, attachment, bones.size(), release);
-  for (size_t v = 0; v < deep.size(); ++v) {
-    const int32_t own = attachment.bone[v];
-    if (own < 0 || releasing[v] > limits[own]) continue;
-    attachment.settle(v, release.how);
-    ++attachment.released;
-  }
+  for (size_t v = 0; v < deep.size(); ++v)
+    if (const int32_t own = attachment.bone[v]; own >= 0)
+      release_column(v, held_share(releasing[v], limits[own], release.band), release.how,
+                     attachment);
   return limits;
 }
 
@@ -89,15 +111,13 @@ void release_near_rim(const std::vector<Vec3>& deep, const std::vector<char>& ri
   for (size_t v = 0; v < deep.size(); ++v)
     if (rim[v]) fixed.push_back(deep[v]);
   for (size_t v = 0; v < deep.size(); ++v) {
-    if (attachment.bone[v] < 0) continue;
-    const double near =
-        release.distance * released_share(range.travel(deep[v], attachment.bone[v]));
-    if (!(near > 0) || std::none_of(fixed.begin(), fixed.end(), [&](const Vec3& p) {
-          return (p - deep[v]).squaredNorm() <= near * near;
-        }))
-      continue;
-    attachment.settle(v, release.how);
-    ++attachment.released;
+    const int32_t own = std::max(attachment.bone[v], attachment.support[v]);
+    const double share = own < 0 ? 0 : released_share(range.travel(deep[v], own));
+    if (!(share > 0)) continue;
+    double nearest = INFINITY;
+    for (const Vec3& p : fixed) nearest = std::min(nearest, (p - deep[v]).squaredNorm());
+    release_column(v, held_share(std::sqrt(nearest) / share, release.distance, release.band),
+                   release.how, attachment);
   }
 }
 

@@ -11,6 +11,8 @@ namespace repose::model {
 struct Release {
   double distance;    ///< mm, at most; 0: nowhere
   scene::Attach how;  ///< what it does then
+  double band;  ///< on both sides of a release distance, over it, where support is elastic; 0:
+                ///< columns are held or released
   std::vector<double> pedicle =
       {};  ///< [bones] least share of the tissue that stays attached; or empty
   std::span<const double> area = {};  ///< [V] mm², of the columns; needed with `pedicle`
@@ -23,7 +25,7 @@ struct Release {
 /// scene with a plan the difference is the largest in its box. Of the columns on each bone, those
 /// nearest to other pieces are released, with no more than the share 1 − pedicle of their area.
 /// Returns the release distance of each bone, mm [bones]: release.distance, or less where the
-/// pedicle limits it (negative: nothing is released).
+/// pedicle limits it (0: nothing is released).
 std::vector<double> release_near_other_pieces(const std::vector<Vec3>& deep, const BoneField& bones,
                                               const MotionRange& range, const Release& release,
                                               Attachment& attachment);

@@ -87,6 +87,8 @@ void check_elements(const std::vector<TermElements>& all, size_t points, size_t 
     check.integer(name, 0, of.bone_number, -1, of.numbers_each - 1);
     if (of.bone_number < 0) continue;
     for (size_t e = 0; e < of.size(); ++e) {
+      if (of.term == "elastic_support" && of.numbers_each == 5)
+        check.number(name + "/numbers", 5 * e + 3, of.numbers_of(e)[3], at_least_zero("N/mm"));
       const double bone = of.numbers_of(e)[of.bone_number];
       if (!(bone >= 0 && bone < static_cast<double>(bones) && bone == std::floor(bone)))
         check.refuse(name + "/numbers",

@@ -121,7 +121,9 @@ Keys tissue_keys() {
        Range::above(0)},
       {"tissue.release", number, "10",
        "Tissue lets go of bone this near to a piece that moves differently by 4 mm or more, and "
-       "proportionally nearer where by less; 0 never does.",
+       "proportionally nearer where by less; 0 never does. A solid lets go gradually, from 1.4 "
+       "down "
+       "to 0.6 of that distance.",
        "mm", Range::at_least(0)},
       {"tissue.unattached", list, "",
        "Regions that touch bone but do not hold to it (lips, cheeks); an alias of attach_regions "

@@ -71,10 +71,10 @@ Change differentiate_by(discrete::Objective& objective, Vec displacement, const 
 class StrataForces {
  public:
   /// At the positions' last update.
-  StrataForces(const discrete::Positions& positions, const Derivatives& requested)
-      : positions_(positions), strata_(requested.strata), in_region_(requested.in_region) {
+  StrataForces(const discrete::Objective& objective, const Derivatives& requested)
+      : objective_(objective), strata_(requested.strata), in_region_(requested.in_region) {
     if (strata_.empty()) return;
-    const model::Model& model = positions.part().model;
+    const model::Model& model = positions().part().model;
     std::vector<double> thickness;
     for (const Stratum& stratum : std::span(strata_).first(strata_.size() - 1))
       thickness.push_back(stratum.thickness);
@@ -85,20 +85,32 @@ class StrataForces {
 
   /// N, of a stratum on all local points, into `slope`. Not collective.
   void restrict_to_owned(size_t stratum, Vec slope) const {
-    std::vector<Vec3> force(positions_.local().size(), Vec3::Zero());
+    std::vector<Vec3> force(positions().local().size(), Vec3::Zero());
     for (size_t m = 0; m < share_.size(); ++m)
       if (share_[m][stratum] > 0 && is_of_strata(m)) add(m, share_[m][stratum], stratum, force);
-    positions_.restrict_to_owned(force, slope);
+    if (stratum + 1 == strata_.size()) add_supports(force);
+    positions().restrict_to_owned(force, slope);
   }
 
  private:
+  const discrete::Positions& positions() const { return objective_.positions(); }
+
+  /// Elastic supports are as stiff as the deepest stratum.
+  void add_supports(std::vector<Vec3>& force) const {
+    const auto& elements = positions().part().model.elements;
+    for (size_t k = 0; k < elements.size(); ++k)
+      if (elements[k].term == "elastic_support")
+        objective_.loops().terms[k].add_gradient(positions().local(), positions().poses(), 1,
+                                                 force);
+  }
+
   /// False for a prism of a region, which has moduli of its own.
   bool is_of_strata(size_t m) const { return in_region_.empty() || !in_region_[m]; }
 
   void add(size_t m, double share, size_t stratum, std::vector<Vec3>& force) const {
-    const model::Model& model = positions_.part().model;
+    const model::Model& model = positions().part().model;
     const auto& corners = model.prisms.points[m];
-    const std::array<Vec3, 6> now = base::pick(positions_.local(), corners);
+    const std::array<Vec3, 6> now = base::pick(positions().local(), corners);
     const double shear = share * strata_[stratum].shear, bulk = share * strata_[stratum].bulk;
     const auto weights = model::pair_weights(model::corners_of(model, m)).value();
     for (size_t k = 0; k < weights.size(); ++k) {
@@ -112,7 +124,7 @@ class StrataForces {
     for (int c = 0; c < 6; ++c) force[corners[c]] += pressure * mechanics::vec3(volume.gradient[c]);
   }
 
-  const discrete::Positions& positions_;
+  const discrete::Objective& objective_;
   const std::vector<Stratum>& strata_;
   const std::vector<char>& in_region_;
   std::vector<std::vector<double>> share_;  // [prisms][strata]
@@ -201,7 +213,7 @@ std::optional<Gradient> differentiate(Problem& problem, const discrete::NaturalR
             c < 3 ? "mm/mm" : "mm/degree",
             differentiate_by(objective, displacement, piece, c, slope), &Gradient::by_pieces);
     positions.update(displacement);
-    const StrataForces strata(positions, requested);
+    const StrataForces strata(objective, requested);
     const mechanics::BodyContact& bodies = objective.contact().bodies();
     const Change unchanged{std::vector<Vec3>(positions.local().size(), Vec3::Zero()),
                            std::vector<double>(bodies.gaps().size(), 0.0),

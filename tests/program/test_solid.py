@@ -31,6 +31,7 @@ bones:
   - {{name: mandible, file: {MESHES}/paper_mandible.ply}}
 tissue:
   layers: 4
+  release: 0
   material: {{law: neo_hookean, young: {young}, poisson: {poisson}{skin}}}
 """
 

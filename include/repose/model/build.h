@@ -89,6 +89,9 @@ struct ColumnEnds {
   std::vector<int32_t> bone;       ///< that it moves with, −1 for none
   std::vector<int32_t> slides_on;  ///< bone that it slides along, −1 for none
   std::vector<char> free;          ///< 1: it does not even touch bones
+  std::vector<int32_t> support;    ///< bone that supports it elastically, −1 for none
+  /// Stiffness of that support, in units of Young's modulus below all strata over the thickness.
+  std::vector<double> support_stiffness;
 };
 
 /// Loads of columns of tissue.

@@ -5,6 +5,7 @@
 
 #include "check_adhesion.h"
 #include "check_contact.h"
+#include "check_supports.h"
 #include "recompute.h"
 #include "repose/base/error.h"
 #include "repose/model/motion.h"
@@ -159,6 +160,7 @@ Comparison check_file(const std::string& file) {
   check_model(model, comparison);
   const std::vector<Film> films = find_films(model);
   check_adhesion(model, films, comparison);
+  check_supports(model, comparison);
   std::vector<model::StepNumbers> steps;
   for (int64_t s = 0; s < count; ++s) {
     const results::StoredStep step = results::read_step(file, s, model);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "check_supports.h"
 #include "repose/mechanics/spring_law.h"
 #include "repose/mechanics/stress.h"
 #include "repose/mechanics/term.h"
@@ -71,6 +72,7 @@ class Recomputation {
     edges();
     terms();
     adhesion();
+    supports();
     contact();
     forces();
     gradient_.assign(x_.size(), Vec3::Zero());
@@ -94,6 +96,7 @@ class Recomputation {
   void edges();
   void terms();
   void adhesion();
+  void supports();
   void contact();
   void forces();
   void nodal_volumes();
@@ -271,7 +274,7 @@ void Recomputation::stress(int64_t j, const std::array<Vec3, 6>& corners) {
 // Their energies are from the initial state on.
 void Recomputation::terms() {
   for (const model::TermElements& elements : model_.elements) {
-    if (elements.term == "adhesion") continue;
+    if (elements.term == "adhesion" || elements.term == "elastic_support") continue;
     const mechanics::Term& term = mechanics::term_of(elements);
     double uncertain = 0;
     for (size_t e = 0; e < elements.size(); ++e) {
@@ -312,6 +315,17 @@ void Recomputation::adhesion() {
     uncertain += state.energy + step_.scale.position * state.force.norm();
     if (soft(point)) step_.rows.residual_force[point] += state.force;
     at_point_[point] += state.force.norm() + state.noise;
+  }
+  step_.f_e.scale += rounding * uncertain / tolerance + std::abs(step_.f_e.value);
+}
+
+void Recomputation::supports() {
+  double uncertain = 0;
+  for (const SupportState& state : evaluate_supports(model_, motion_, claimed_.load, x_)) {
+    step_.f_e.value += state.energy;
+    uncertain += state.energy + step_.scale.position * state.force.norm();
+    if (soft(state.point)) step_.rows.residual_force[state.point] += state.force;
+    at_point_[state.point] += state.force.norm() + state.noise;
   }
   step_.f_e.scale += rounding * uncertain / tolerance + std::abs(step_.f_e.value);
 }

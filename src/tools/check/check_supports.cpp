@@ -1,0 +1,78 @@
+#include "check_supports.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <set>
+
+namespace repose::tools::check {
+
+namespace {
+
+constexpr int64_t number_count = 5;  // the place (3), the stiffness, the bone
+
+const model::TermElements* supports_of(const model::Model& model) {
+  const auto found =
+      std::ranges::find(model.elements, std::string("elastic_support"), &model::TermElements::term);
+  return found == model.elements.end() ? nullptr : &*found;
+}
+
+bool has_shape(const model::TermElements& supports) {
+  return supports.points_each == 1 && supports.numbers_each == number_count &&
+         supports.bone_number == number_count - 1;
+}
+
+/// What is wrong with the first support that is; empty of right ones.
+std::string first_wrong(const model::Model& model, const model::TermElements& supports) {
+  const model::Points& points = model.points;
+  const int32_t deepest = *std::ranges::max_element(points.layer);
+  std::set<int64_t> seen;
+  for (size_t e = 0; e < supports.size(); ++e) {
+    const int64_t point = supports.points_of(e)[0];
+    const auto numbers = supports.numbers_of(e);
+    if (!seen.insert(point).second) return fmt::format("point {} is supported twice", point);
+    if (points.layer[point] != deepest || points.set[point] != model::PointSet::soft_tissue)
+      return fmt::format("point {} is supported, but is no deepest point of soft tissue", point);
+    if (Vec3(numbers[0], numbers[1], numbers[2]) != points.position[point])
+      return fmt::format("point {} is supported elsewhere than it begins", point);
+    if (!(numbers[3] > 0))
+      return fmt::format("point {} is supported with {:g} N/mm", point, numbers[3]);
+  }
+  return "";
+}
+
+}  // namespace
+
+std::vector<SupportState> evaluate_supports(const model::Model& model,
+                                            const model::PrescribedMotion& motion, double load,
+                                            const std::vector<Vec3>& position) {
+  std::vector<SupportState> states;
+  const model::TermElements* supports = supports_of(model);
+  if (!supports || !has_shape(*supports)) return states;
+  for (size_t e = 0; e < supports->size(); ++e) {
+    const int64_t point = supports->points_of(e)[0];
+    const auto numbers = supports->numbers_of(e);
+    const Mat4 pose = motion.bone_matrix(static_cast<int32_t>(numbers[4]), load);
+    const Vec3 place = pose.topLeftCorner<3, 3>() * Vec3(numbers[0], numbers[1], numbers[2]) +
+                       pose.topRightCorner<3, 1>();
+    const Vec3 way = position[point] - place;
+    states.push_back({point, numbers[3] * way.squaredNorm() / 2, -numbers[3] * way,
+                      numbers[3] * position[point].lpNorm<Eigen::Infinity>()});
+  }
+  return states;
+}
+
+void check_supports(const model::Model& model, Comparison& comparison) {
+  const model::TermElements* supports = supports_of(model);
+  if (!supports) return;
+  comparison.statement(
+      "elements of elastic_support have 1 point and 5 numbers, of which the last is the bone",
+      has_shape(*supports));
+  if (!has_shape(*supports)) return;
+  const std::string wrong = first_wrong(model, *supports);
+  comparison.statement(
+      wrong.empty() ? "elastic supports hold deepest points where they begin" : wrong,
+      wrong.empty());
+}
+
+}  // namespace repose::tools::check
