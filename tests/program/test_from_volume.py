@@ -400,6 +400,7 @@ def test_voxels_of_the_shipped_head_become_a_scene(parts, written, tmp_path, env
         assert np.linalg.norm(place[name] - given[name]) < 5
 
 
+@pytest.mark.long
 def test_landmarks_are_searched_on_skull_and_maxilla_together(parts, tmp_path, environment):
     z, y = (ORIGIN[axis] + SPACING * np.arange(SIZE[axis]) for axis in (2, 1))
     given, places = json.loads((PROJECT / "meshes/head_landmarks.json").read_text()), []

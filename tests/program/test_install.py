@@ -82,6 +82,7 @@ def test_the_panel_finds_its_program(prefix, call, tmp_path):
         assert h5.attrs["command"].decode().startswith(str(prefix / "bin/repose-solve"))
 
 
+@pytest.mark.long
 def test_a_program_of_ones_own_builds_against_it(prefix, call, tmp_path):
     example = prefix / "share/repose/examples/own_energy"
     result = call("cmake", "-S", example, "-B", "own", f"-DCMAKE_PREFIX_PATH={prefix}")

@@ -184,6 +184,7 @@ def test_refuses_landmarks_of_another_frame_or_side(run, tmp_path, change, line)
     assert result.returncode == 1 and line in result.stderr and result.stderr.count("\n") == 1, result
 
 
+@pytest.mark.long
 def test_measures_its_error(environment, tmp_path):
     pytest.importorskip("scipy")
     page = tmp_path / "page.md"

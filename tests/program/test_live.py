@@ -44,6 +44,7 @@ def test_the_program_of_the_named_build_is_taken(monkeypatch, tmp_path):
     assert repose.session.find_program() == str(tmp_path / "bin/repose-live")
 
 
+@pytest.mark.long
 def test_answers_do_not_depend_on_their_order(session):
     first = session.solve(A)
     other = session.solve(B)

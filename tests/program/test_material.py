@@ -108,7 +108,7 @@ def solve(run, tmp_path, name, text, *options, ranks=1, status=0):
 
 
 @pytest.mark.parametrize("moves, more, tissue", [
-    (JAW_FORWARD, "", ""), (JAW_OPENS, "", ""),
+    *(pytest.param(move, "", "", marks=pytest.mark.long) for move in (JAW_FORWARD, JAW_OPENS)),
     ("  - {bone: chin, translate: [0, -8, 0]}", CHIN, "  release: 5")])
 def test_one_face_whatever_the_load_steps_and_the_ranks(run, tmp_path, moves, more, tissue):
     text, accuracy = scene(tissue, moves, more), 0.001
@@ -132,6 +132,7 @@ def test_every_method_finds_the_face(run, tmp_path):
         assert apart(default, last(other)) <= 2 * accuracy, method
 
 
+@pytest.mark.long
 def test_averaged_volumes_make_one_face_on_any_ranks(run, tmp_path):
     text, accuracy = scene("  material: {poisson: 0.49, dilatation: nodal}", JAW_OPENS), 0.001
     options = "-accuracy", accuracy

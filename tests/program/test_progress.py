@@ -96,6 +96,7 @@ def small_head(environment, folder, vertices=4000):
                    cwd=folder, env=environment, check=True, stdout=subprocess.DEVNULL)
 
 
+@pytest.mark.long
 def test_a_model_that_takes_long_shows_that_it_is_built(environment, tmp_path):
     small_head(environment, tmp_path, 8000)
     built = r"\[#+\.+\] building the model  \d+ s  about \d+ s left"

@@ -122,6 +122,7 @@ def test_the_pictures_can_be_drawn(folder):
     assert (folder / "few_map.png").stat().st_size > 10000
 
 
+@pytest.mark.long
 def test_a_solid_is_compared_with_springs_and_drawn(run, tmp_path):
     result = run("repose-tradeoff", PROJECT / "meshes/head_solid.yaml", "-methods", "ntr",
                  "-accuracies", "1", "-load_steps", ",", "-layers", "2,3", "-edges", ",",
