@@ -20,8 +20,9 @@ using base::pick;
 void copy_columns(const base::Message& copy, RankColumns& d) {
   model::Piece& p = d.piece;
   copy(p.column, p.skin, p.deep, p.ends.bone, p.ends.slides_on, p.ends.free, p.ends.support,
-       p.ends.support_stiffness, p.rim, p.parted, p.jaws, p.corner, p.triangle, p.edge, p.slope,
-       p.loads.instrument, p.loads.target, p.loads.force, p.loads.layer_area);
+       p.ends.support_stiffness, p.ends.supported_whole, p.rim, p.parted, p.jaws, p.corner,
+       p.triangle, p.edge, p.slope, p.loads.instrument, p.loads.target, p.loads.force,
+       p.loads.layer_area);
   copy(d.owner, d.place, d.unknown, d.layers, d.columns, d.triangles, d.edges, d.unknowns,
        d.doubled);
   auto count = d.cuts.size();

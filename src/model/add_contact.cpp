@@ -67,7 +67,7 @@ class ContactAdder {
     for (int32_t b = 0; b < bones; ++b)
       if (b == slides_on(point))
         add(point, b, Binding::slides, area, model_.contact.pairs);
-      else if (touching_ && !ends_.free[column] &&
+      else if (touching_ && !ends_.free[column] && !held_against(point, b) &&
                trees_[b].any_within(model_.points.position[point], reach_[b] * reach_[b]) >= 0)
         add(point, b, Binding::touches, area, model_.contact.pairs);
     for (int32_t b = bones; skin && b < bodies; ++b)
@@ -75,10 +75,21 @@ class ContactAdder {
   }
 
  private:
-  int32_t slides_on(int64_t point) const {
+  bool is_deepest(int64_t point) const {
     const auto layers =
         static_cast<int64_t>(model_.points.position.size() / ends_.slides_on.size());
-    return point % layers == layers - 1 ? ends_.slides_on[point / layers] : -1;
+    return point % layers == layers - 1;
+  }
+  int32_t slides_on(int64_t point) const {
+    return is_deepest(point) ? ends_.slides_on[model_.points.column[point]] : -1;
+  }
+  /// Returns whether a bone that the point is not supported by moves past it as it would past bone
+  /// that holds the point: where bones overlap, contact would fight a support.
+  bool held_against(int64_t point, int32_t bone) const {
+    constexpr double held = 1;  // stiffness, in the middle of the band
+    const int64_t column = model_.points.column[point];
+    return (is_deepest(point) || ends_.supported_whole[column]) && ends_.support[column] >= 0 &&
+           ends_.support[column] != bone && ends_.support_stiffness[column] >= held;
   }
 
   const ColumnEnds& ends_;

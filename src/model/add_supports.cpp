@@ -13,13 +13,16 @@ void add_supports(const ColumnEnds& ends, double young, const SkinMesh& mesh, Mo
   const size_t columns = ends.support.size(), layers = x.size() / std::max<size_t>(columns, 1);
   for (size_t c = 0; c < columns; ++c) {
     if (ends.support[c] < 0) continue;
-    const size_t deepest = (c + 1) * layers - 1;
-    const Vec3& at = x[deepest];
-    const double thickness = (at - x[c * layers]).norm();
-    const double stiffness = ends.support_stiffness[c] * young * area[deepest] / thickness;
-    elements.points.push_back(static_cast<int64_t>(deepest));
-    elements.numbers.insert(elements.numbers.end(), {at.x(), at.y(), at.z(), stiffness,
-                                                     static_cast<double>(ends.support[c])});
+    const size_t first = c * layers, deepest = first + layers - 1;
+    const double stiffness =
+        ends.support_stiffness[c] * young / (x[deepest] - x[first]).norm();  // N/mm³
+    for (size_t i = ends.supported_whole[c] ? first : deepest; i <= deepest; ++i) {
+      if (model.points.set[i] != PointSet::soft_tissue) continue;
+      elements.points.push_back(static_cast<int64_t>(i));
+      elements.numbers.insert(elements.numbers.end(),
+                              {x[i].x(), x[i].y(), x[i].z(), stiffness * area[i],
+                               static_cast<double>(ends.support[c])});
+    }
   }
   model.elements.push_back(std::move(elements));
 }

@@ -5,8 +5,9 @@
 namespace repose::model {
 
 /// Adds elastic supports of columns to a model of make_layers, as elements of the term
-/// "elastic_support" at the deepest points: stiffness × `young` / thickness of the column × area of
-/// the point, N/mm. `young` in N/mm², `mesh` with the model's triangles.
+/// "elastic_support" at the deepest points, or at all points of a column that is supported_whole:
+/// stiffness × `young` / thickness of the column × area of the point, N/mm. `young` in N/mm²,
+/// `mesh` with the model's triangles.
 void add_supports(const ColumnEnds& ends, double young, const SkinMesh& mesh, Model& model);
 
 /// Shares supports between points and their doubles beyond a cut (`twins`, rows of both).

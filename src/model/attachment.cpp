@@ -81,6 +81,7 @@ Attachment attach_columns(const Columns& columns, const BoneField& bones,
   attachment.free.assign(columns.deep.size(), 0);
   attachment.support.assign(columns.deep.size(), -1);
   attachment.support_stiffness.assign(columns.deep.size(), 0);
+  attachment.supported_whole.assign(columns.deep.size(), 0);
   attachment.reached.assign(bones.size(), 0);
   for (size_t v = 0; v < columns.deep.size(); ++v) {
     if (!columns.holds[v]) continue;

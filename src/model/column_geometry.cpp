@@ -171,9 +171,12 @@ Piece ColumnGeometry::piece(const std::vector<int64_t>& columns) const {
     piece.parted.push_back(state_->parted[c]);
   }
   const ColumnEnds& ends = layout.attachment;
-  piece.ends = {base::pick(ends.bone, piece.column), base::pick(ends.slides_on, piece.column),
-                base::pick(ends.free, piece.column), base::pick(ends.support, piece.column),
-                base::pick(ends.support_stiffness, piece.column)};
+  piece.ends = {base::pick(ends.bone, piece.column),
+                base::pick(ends.slides_on, piece.column),
+                base::pick(ends.free, piece.column),
+                base::pick(ends.support, piece.column),
+                base::pick(ends.support_stiffness, piece.column),
+                base::pick(ends.supported_whole, piece.column)};
   const ColumnLoads& loads = state_->loads;
   piece.loads = {base::pick(loads.instrument, piece.column), base::pick(loads.target, piece.column),
                  base::pick(loads.force, piece.column), loads.layer_area};

@@ -87,9 +87,12 @@ void settle_rim(const scene::Scene& scene, const MotionRange& range, ColumnLayou
   release_from_bones(scene, range, layout);
   if (scene.rim != scene::Rim::automatic) return;
   const std::vector<char> border = rim;
+  const auto stays = [&](size_t c, int32_t bone) {
+    return bone >= 0 && range.travel(layout.columns.deep[c], bone) <= negligible_travel;
+  };
   for (size_t c = 0; c < rim.size(); ++c) {
-    const int32_t bone = attachment.bone[c] >= 0 ? attachment.bone[c] : sliding[c];
-    rim[c] = rim[c] && bone >= 0 && range.travel(layout.columns.deep[c], bone) <= negligible_travel;
+    attachment.supported_whole[c] = rim[c] && stays(c, attachment.support[c]);
+    rim[c] = rim[c] && stays(c, attachment.bone[c] >= 0 ? attachment.bone[c] : sliding[c]);
   }
   const bool held = std::ranges::any_of(rim, [](char fixed) { return fixed != 0; }) ||
                     std::ranges::any_of(attachment.bone, [](int32_t bone) { return bone >= 0; });

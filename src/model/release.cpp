@@ -49,6 +49,9 @@ double held_share(double releasing, double limit, double band) {
   return std::clamp((releasing / limit - 1 + band) / (2 * band), 0.0, 1.0);
 }
 
+/// The share by which an elastic support holds.
+double share_of_stiffness(double stiffness) { return stiffness / (1 + stiffness); }
+
 /// Lets go of a column but for the share `held`: by an elastic support that is rigid at 1 and
 /// vanishes at 0.
 void release_column(size_t column, double held, scene::Attach how, Attachment& attachment) {
@@ -107,17 +110,22 @@ std::vector<double> release_near_other_pieces(const std::vector<Vec3>& deep, con
 void release_near_rim(const std::vector<Vec3>& deep, const std::vector<char>& rim,
                       const MotionRange& range, const Release& release, Attachment& attachment) {
   if (!(release.distance > 0)) return;
-  std::vector<Vec3> fixed;
+  std::vector<std::pair<Vec3, double>> held;  // deepest points of the rim, and how far it is
   for (size_t v = 0; v < deep.size(); ++v)
-    if (rim[v]) fixed.push_back(deep[v]);
+    if (rim[v])
+      held.emplace_back(deep[v], 1);
+    else if (attachment.supported_whole[v])
+      held.emplace_back(deep[v], share_of_stiffness(attachment.support_stiffness[v]));
   for (size_t v = 0; v < deep.size(); ++v) {
     const int32_t own = std::max(attachment.bone[v], attachment.support[v]);
-    const double share = own < 0 ? 0 : released_share(range.travel(deep[v], own));
+    const double share =
+        own < 0 || attachment.supported_whole[v] ? 0 : released_share(range.travel(deep[v], own));
     if (!(share > 0)) continue;
-    double nearest = INFINITY;
-    for (const Vec3& p : fixed) nearest = std::min(nearest, (p - deep[v]).squaredNorm());
-    release_column(v, held_share(std::sqrt(nearest) / share, release.distance, release.band),
-                   release.how, attachment);
+    double releasing = INFINITY;
+    for (const auto& [at, by] : held)
+      releasing = std::min(releasing, (at - deep[v]).norm() / (by * share));
+    release_column(v, held_share(releasing, release.distance, release.band), release.how,
+                   attachment);
   }
 }
 

@@ -31,7 +31,8 @@ std::vector<double> release_near_other_pieces(const std::vector<Vec3>& deep, con
                                               Attachment& attachment);
 
 /// Lets go by the same rule of deepest points near that of a rim column (`rim` [V], 1 or 0): the
-/// rim stays where it is, so to bones that move it is another piece.
+/// rim stays where it is, so to bones that move it is another piece. Columns that are
+/// supported_whole are rim as far as they are held.
 void release_near_rim(const std::vector<Vec3>& deep, const std::vector<char>& rim,
                       const MotionRange& range, const Release& release, Attachment& attachment);
 

@@ -263,7 +263,8 @@ SPOILED_SUPPORTS = {
     "a point less": (supports(lambda points, numbers: (points[1:], numbers[1:])), "residual_force"),
     "a point twice": (supports(lambda points, numbers: (
         points[[0, *range(len(points))]], numbers[[0, *range(len(numbers))]])), "supported twice"),
-    "a point above": (supports(lambda points, numbers: (points - 1, numbers)), "no deepest point"),
+    "a point above": (supports(lambda points, numbers: (points - 1, numbers)),
+                      "supported elsewhere than it begins"),
     "places a micrometer off": (supports(lambda points, numbers: (
         points, numbers + [0, 1e-3, 0, 0, 0])), "supported elsewhere than it begins"),
     "twice the stiffness": (supports(lambda points, numbers: (

@@ -92,6 +92,7 @@ struct ColumnEnds {
   std::vector<int32_t> support;    ///< bone that supports it elastically, −1 for none
   /// Stiffness of that support, in units of Young's modulus below all strata over the thickness.
   std::vector<double> support_stiffness;
+  std::vector<char> supported_whole;  ///< 1: all its points are, not the deepest alone
 };
 
 /// Loads of columns of tissue.

@@ -25,14 +25,13 @@ bool has_shape(const model::TermElements& supports) {
 /// What is wrong with the first support that is; empty of right ones.
 std::string first_wrong(const model::Model& model, const model::TermElements& supports) {
   const model::Points& points = model.points;
-  const int32_t deepest = *std::ranges::max_element(points.layer);
   std::set<int64_t> seen;
   for (size_t e = 0; e < supports.size(); ++e) {
     const int64_t point = supports.points_of(e)[0];
     const auto numbers = supports.numbers_of(e);
     if (!seen.insert(point).second) return fmt::format("point {} is supported twice", point);
-    if (points.layer[point] != deepest || points.set[point] != model::PointSet::soft_tissue)
-      return fmt::format("point {} is supported, but is no deepest point of soft tissue", point);
+    if (points.set[point] != model::PointSet::soft_tissue)
+      return fmt::format("point {} is supported, but is no soft tissue", point);
     if (Vec3(numbers[0], numbers[1], numbers[2]) != points.position[point])
       return fmt::format("point {} is supported elsewhere than it begins", point);
     if (!(numbers[3] > 0))
@@ -70,9 +69,8 @@ void check_supports(const model::Model& model, Comparison& comparison) {
       has_shape(*supports));
   if (!has_shape(*supports)) return;
   const std::string wrong = first_wrong(model, *supports);
-  comparison.statement(
-      wrong.empty() ? "elastic supports hold deepest points where they begin" : wrong,
-      wrong.empty());
+  comparison.statement(wrong.empty() ? "elastic supports hold points where they begin" : wrong,
+                       wrong.empty());
 }
 
 }  // namespace repose::tools::check

@@ -16,7 +16,7 @@ std::vector<SupportState> evaluate_supports(const model::Model& model,
                                             const model::PrescribedMotion& motion, double load,
                                             const std::vector<Vec3>& position);
 
-/// States whether elastic supports hold deepest points of soft tissue where these begin.
+/// States whether elastic supports hold points of soft tissue where these begin.
 void check_supports(const model::Model& model, Comparison& comparison);
 
 }  // namespace repose::tools::check

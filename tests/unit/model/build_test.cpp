@@ -243,20 +243,21 @@ TEST(Build, tissue_lets_go_the_farther_the_more_differently_pieces_move) {
   EXPECT_EQ(released_at(6), 41 * 8);   // at most
 }
 
-/// Share by which the deepest point of each column follows its bone, against a spring as stiff as
-/// the tissue above it.
-std::vector<double> held_shares(const TwoJaws& jaws) {
+/// Share by which the point of a layer of each column follows its bone, against a spring as stiff
+/// as the tissue above it. `area` in mm², of a point.
+std::vector<double> held_shares(const TwoJaws& jaws, int64_t layer, double area) {
   const BuiltModel built = build_model(jaws.scene, jaws.skin, jaws.bones);
   const Points& points = built.model.points;
-  const double area = 6.25, thickness = 10;  // mm², mm; of columns that are not at the rim
+  constexpr double thickness = 10;  // mm
   std::vector<double> shares;
-  for (size_t i = 1; i < points.position.size(); i += 2)
-    shares.push_back(points.set[i] == PointSet::bone ? 1 : 0);
+  for (size_t i = layer; i < points.position.size(); i += 2)
+    shares.push_back(points.set[i] == PointSet::soft_tissue ? 0 : 1);
   for (const TermElements& elements : built.model.elements) {
     EXPECT_EQ(elements.term, "elastic_support");
     for (size_t e = 0; e < elements.size(); ++e) {
       const int64_t point = elements.points_of(e)[0];
       const auto numbers = elements.numbers_of(e);
+      if (point % 2 != layer) continue;
       EXPECT_EQ(points.set[point], PointSet::soft_tissue);
       EXPECT_EQ(Vec3(numbers[0], numbers[1], numbers[2]), points.position[point]);
       EXPECT_EQ(numbers[4], points.position[point].x() < 51.25 ? 0 : 1);
@@ -274,7 +275,7 @@ TEST(Build, the_support_of_a_solid_by_bone_follows_the_move_without_a_jump) {
   jaws.scene.tissue.material = scene::Material{{0.015, 0.45}, {}, {}};
   const auto shares_at = [&](double difference) {
     jaws.scene.moves[1] = RigidMotion::translation({0, difference, 0});
-    return held_shares(jaws);
+    return held_shares(jaws, 1, 6.25);
   };
   const size_t row = 20 * 41;  // in the middle, 2.5 mm apart, the gap between 51.2 and 51.3
   const std::vector<double> far = shares_at(4);
@@ -288,6 +289,47 @@ TEST(Build, the_support_of_a_solid_by_bone_follows_the_move_without_a_jump) {
       EXPECT_NEAR(now[row + column], before[row + column], 0.08) << column << " at " << difference;
     before = now;
   }
+}
+
+TEST(Build, a_rim_lets_go_beside_a_moving_piece_without_a_jump) {
+  TwoJaws jaws;
+  jaws.scene.tissue.material = scene::Material{{0.015, 0.45}, {}, {}};
+  const auto shares_at = [&](double difference) {
+    jaws.scene.moves[1] = RigidMotion::translation({0, difference, 0});
+    return held_shares(jaws, 0, 3.125);  // of points of the skin at the rim
+  };
+  const std::vector<double> far = shares_at(4);
+  EXPECT_EQ(far[14], 1);
+  EXPECT_NEAR(far[16], (11.3 / 10 - 0.6) / 0.8, 1e-9);
+  EXPECT_EQ(far[20], 0);
+  EXPECT_EQ(far[30], 0);  // of the jaw that moves
+  std::vector<double> before = shares_at(0.5);
+  for (double difference = 0.52; difference < 4.5; difference += 0.02) {
+    const std::vector<double> now = shares_at(difference);
+    for (int column = 1; column <= 20; ++column)
+      EXPECT_NEAR(now[column], before[column], 0.08) << column << " at " << difference;
+    before = now;
+  }
+}
+
+TEST(Build, where_bones_overlap_a_point_that_is_more_held_than_not_touches_its_own_alone) {
+  TwoJaws jaws;
+  jaws.scene.rim = scene::Rim::free;
+  jaws.scene.tissue.material = scene::Material{{0.015, 0.45}, {}, {}};
+  jaws.scene.contact = scene::Contact{};
+  jaws.scene.moves[1] = RigidMotion::translation({0, 6, 0});
+  const Model model = build_model(jaws.scene, jaws.skin, jaws.bones).model;
+  const size_t row = 20 * 41;
+  const auto touched_by = [&](size_t column) {
+    std::vector<int32_t> bodies;
+    for (size_t c = 0; c < model.contact.pairs.point.size(); ++c)
+      if (model.contact.pairs.point[c] == static_cast<int64_t>(2 * (row + column) + 1))
+        bodies.push_back(model.contact.pairs.body[c]);
+    return bodies;
+  };
+  EXPECT_EQ(touched_by(16), std::vector<int32_t>({0}));     // held by 0.66
+  EXPECT_EQ(touched_by(17), std::vector<int32_t>({0, 1}));  // by 0.35
+  EXPECT_EQ(touched_by(14), std::vector<int32_t>());        // by bone
 }
 
 TEST(Build, a_share_of_the_tissue_of_a_chin_stays_attached) {
