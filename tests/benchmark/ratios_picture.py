@@ -7,7 +7,7 @@ section of tissue, bones and teeth, one picture an operation.
 
 FOLDER holds the results of ratios.py and their landmarks, OUT is a folder, WAY one of those of
 ratios.py (default). In the section tissue that holds to bone ends in red; tissue that touches bone or
-teeth, as in the vestibule, or is free, ends in blue. Needs what drivers/render.py does, by which it
+teeth, as in the vestibule, is supported elastically or free ends in blue. Needs what drivers/render.py does, by which it
 draws.
 """
 
