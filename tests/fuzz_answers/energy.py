@@ -80,6 +80,24 @@ class Energy:
             self.set_springs(step)
         self.rows = rows_of(self.prisms)
         self.gather_volumes()
+        self.set_supports()
+
+    def set_supports(self):
+        """Elastic supports: points, initial places, stiffnesses and bones."""
+        numbers, self.supported = np.zeros((0, 5)), np.zeros(0, int)
+        for name, term in self.model.items():
+            if name.endswith("@term") and term == b"elastic_support":
+                group = name.removesuffix("@term")
+                self.supported = self.model[f"{group}/points"]
+                numbers = self.model[f"{group}/numbers"].reshape(-1, 5)
+        self.support_start, self.support = numbers[:, :3], numbers[:, 3]
+        self.support_bone = numbers[:, 4].astype(int)
+        self.place_supports([(np.eye(3), np.zeros(3))] * (1 + self.support_bone.max(initial=-1)))
+
+    def place_supports(self, motions):
+        """Carries the supports' places with bones, of each its rotation and translation."""
+        self.places = np.array([motions[bone][0] @ at + motions[bone][1] for at, bone in
+                                zip(self.support_start, self.support_bone)]).reshape(-1, 3)
 
     def set_solid(self):
         """Prisms: ½ own (v − V)²/V + slope (v − V); points: ½ e²/C of averaged volumes."""
@@ -134,7 +152,8 @@ class Energy:
         """The numbers f_e, potential and volume energy as a result states them."""
         potential = -(self.load * (x - self.start)).sum()
         if self.solid:
-            return self.solid_energy(x) - self.solid_energy(self.start), potential, 0.0
+            stretch = (self.support * ((x[self.supported] - self.places) ** 2).sum(1)).sum() / 2
+            return self.solid_energy(x) - self.solid_energy(self.start) + stretch, potential, 0.0
         v = wedges(x, self.prisms)[0]
         return self.pull(x)[0].sum(), potential, (self.quadratic * (v - self.rest) ** 2).sum() / 2
 
@@ -163,6 +182,7 @@ class Energy:
             force = self.elastic * tension[:, None] * unit
         np.add.at(gradient, p, -force)
         np.add.at(gradient, q, force)
+        np.add.at(gradient, self.supported, self.support[:, None] * (x[self.supported] - self.places))
         v, slopes, _ = wedges(x, self.prisms)
         np.add.at(gradient, self.prisms, (self.pressure(v)[:, None] * slopes).reshape(-1, 6, 3))
         return gradient
@@ -178,6 +198,8 @@ class Energy:
         """[3 N, 3 N]."""
         hessian = np.zeros((self.count, self.count))
         self.add_edges(hessian, x)
+        rows = 3 * self.supported[:, None] + np.arange(3)
+        np.add.at(hessian, (rows, rows), self.support[:, None])
         v, slopes, bends = wedges(x, self.prisms)
         blocks = self.pressure(v)[:, None, None] * bends
         blocks += self.quadratic[:, None, None] * slopes[:, :, None] * slopes[:, None]

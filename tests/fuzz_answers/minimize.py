@@ -241,6 +241,8 @@ def place_bodies(problem, model, load):
         motions.append((np.eye(3), np.zeros(3)) if still else screw(transforms[bone], load)
                        if bone >= 0 else (np.eye(3), load * push))
     problem.touches.place(motions)
+    if len(transforms):
+        problem.energy.place_supports([screw(transform, load) for transform in transforms])
 
 
 def fixed_at(model, x, load):
