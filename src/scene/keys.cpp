@@ -122,8 +122,7 @@ Keys tissue_keys() {
       {"tissue.release", number, "10",
        "Tissue lets go of bone this near to a piece that moves differently by 4 mm or more, and "
        "proportionally nearer where by less; 0 never does. A solid lets go gradually, from 1.4 "
-       "down "
-       "to 0.6 of that distance.",
+       "down to 0.6 of that distance.",
        "mm", Range::at_least(0)},
       {"tissue.unattached", list, "",
        "Regions that touch bone but do not hold to it (lips, cheeks); an alias of attach_regions "

@@ -22,7 +22,7 @@ bool has_shape(const model::TermElements& supports) {
          supports.bone_number == number_count - 1;
 }
 
-/// What is wrong with the first support that is; empty of right ones.
+/// Returns the first defect of the supports; empty if there is none.
 std::string first_wrong(const model::Model& model, const model::TermElements& supports) {
   const model::Points& points = model.points;
   std::set<int64_t> seen;
