@@ -16,12 +16,6 @@ namespace {
 using model::AdhesionRule;
 using model::Model;
 
-const model::TermElements* elements_of(const Model& model) {
-  const auto found =
-      std::ranges::find(model.elements, std::string("adhesion"), &model::TermElements::term);
-  return found == model.elements.end() ? nullptr : &*found;
-}
-
 /// z of the broken line from the right corner of the mouth over stomion to the left one, level
 /// beyond its ends.
 double lip_height(const std::array<Vec3, 3>& line, double x) {
@@ -115,6 +109,11 @@ void check_planes(const Model& model, const model::TermElements& elements,
 
 }  // namespace
 
+const model::TermElements* elements_of(const Model& model, const std::string& term) {
+  const auto found = std::ranges::find(model.elements, term, &model::TermElements::term);
+  return found == model.elements.end() ? nullptr : &*found;
+}
+
 std::vector<Film> find_films(const Model& model) {
   if (!model.adhesion) return {};
   const AdhesionRule& rule = *model.adhesion;
@@ -151,7 +150,7 @@ std::vector<Film> find_films(const Model& model) {
 }
 
 void check_adhesion(const Model& model, const std::vector<Film>& films, Comparison& comparison) {
-  const model::TermElements* elements = elements_of(model);
+  const model::TermElements* elements = elements_of(model, "adhesion");
   if (!elements && !model.adhesion) return;
   const bool known = model.adhesion.has_value();
   comparison.statement("the model states where lips adhere (adhesion)", known);

@@ -1,10 +1,14 @@
 #pragma once
+#include <string>
 #include <vector>
 
 #include "repose/model/motion.h"
 #include "repose/tools/check/comparison.h"
 
 namespace repose::tools::check {
+
+/// Returns the elements of a term; null where the model has none.
+const model::TermElements* elements_of(const model::Model& model, const std::string& term);
 
 /// Adhesion of one point to the plane at its nearest tooth, found by Model::adhesion and the
 /// bones' triangles (docs/reference/formats.md). Nothing is shared with the term of the solver.

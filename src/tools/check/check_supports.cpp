@@ -2,20 +2,15 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <set>
+
+#include "check_adhesion.h"
 
 namespace repose::tools::check {
 
 namespace {
 
 constexpr int64_t number_count = 5;  // the place (3), the stiffness, the bone
-
-const model::TermElements* supports_of(const model::Model& model) {
-  const auto found =
-      std::ranges::find(model.elements, std::string("elastic_support"), &model::TermElements::term);
-  return found == model.elements.end() ? nullptr : &*found;
-}
 
 bool has_shape(const model::TermElements& supports) {
   return supports.points_each == 1 && supports.numbers_each == number_count &&
@@ -46,7 +41,7 @@ std::vector<SupportState> evaluate_supports(const model::Model& model,
                                             const model::PrescribedMotion& motion, double load,
                                             const std::vector<Vec3>& position) {
   std::vector<SupportState> states;
-  const model::TermElements* supports = supports_of(model);
+  const model::TermElements* supports = elements_of(model, "elastic_support");
   if (!supports || !has_shape(*supports)) return states;
   for (size_t e = 0; e < supports->size(); ++e) {
     const int64_t point = supports->points_of(e)[0];
@@ -62,7 +57,7 @@ std::vector<SupportState> evaluate_supports(const model::Model& model,
 }
 
 void check_supports(const model::Model& model, Comparison& comparison) {
-  const model::TermElements* supports = supports_of(model);
+  const model::TermElements* supports = elements_of(model, "elastic_support");
   if (!supports) return;
   comparison.statement(
       "elements of elastic_support have 1 point and 5 numbers, of which the last is the bone",
