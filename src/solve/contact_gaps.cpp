@@ -70,6 +70,7 @@ void ContactGaps::add_gaps() {
     state_[k].multiplier = from[gaps_[k].constraint];
   }
   curvature_.clear(), convex_curvature_.clear();
+  curvature_share_ = 1;
   const double scale = objective_.weights().elastic;
   const auto touching = std::span(gaps_).first(touching_);
   for (const bool exact : {true, false})
@@ -109,7 +110,13 @@ bool ContactGaps::choose_active() {
 }
 
 std::pair<ContactGaps::Blocks, ContactGaps::Blocks> ContactGaps::blocks() const {
-  std::pair<Blocks, Blocks> blocks(curvature_, convex_curvature_);
+  std::pair<Blocks, Blocks> blocks({}, convex_curvature_);
+  const auto add_share = [&](const Blocks& of, double share) {
+    if (share == 0) return;
+    for (const auto& [p, q, block] : of) blocks.first.push_back({p, q, share * block});
+  };
+  add_share(curvature_, curvature_share_);
+  add_share(convex_curvature_, 1 - curvature_share_);
   const auto add_to = [](Blocks& to) {
     return [&](int32_t p, int32_t q, const Mat3& block) { to.push_back({p, q, block}); };
   };

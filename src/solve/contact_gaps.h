@@ -23,8 +23,9 @@ class ContactGaps {
   void linearize(Vec displacement, double load, std::span<const Vec3> travel);
   /// Takes a gap of a body, of this rank, in place of that of the same constraint. Not collective.
   void replace(const mechanics::LinearGap& by);
-  /// Leaves the negative part of the gaps' curvature out. Not collective.
-  void reduce_curvature() { curvature_ = convex_curvature_; }
+  /// Keeps a share of the gaps' curvature, from 0 to 1, and of the rest the semidefinite part. Not
+  /// collective.
+  void keep_curvature(double share) { curvature_share_ = share; }
 
   /// Takes d = 0 and no active set. Not collective.
   void begin();
@@ -78,6 +79,7 @@ class ContactGaps {
   size_t touching_ = 0;                     // of them, at bodies
   std::vector<State> state_;                // [gaps]
   Blocks curvature_, convex_curvature_;
+  double curvature_share_ = 1;  // of curvature_ in blocks(); the rest is of convex_curvature_
   std::vector<Vec3> moved_;  // [local points] δ, mm
   base::VecHandle forces_;
 };

@@ -1,6 +1,7 @@
 #include "contact_qp.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace repose::solve {
@@ -76,12 +77,13 @@ bool ContactQp::search(Vec displacement, Vec slope, double tolerance, Vec step) 
 bool ContactQp::solve(Vec displacement, Vec slope, double tolerance, Vec step) {
   const linear::CgInPlaceOfPreonly cg(solver_.krylov());
   const std::vector<double> multipliers = gaps_.multipliers();
-  bool found = search(displacement, slope, tolerance, step);
-  reduced_ = !found;
-  if (reduced_) {
+  constexpr std::array shares = {1.0, 0.7, 0.35, 0.0};  // of the gaps' curvature
+  bool found = false;
+  for (size_t k = 0; k < shares.size() && !found; ++k) {
     gaps_.set_multipliers(multipliers);
-    gaps_.reduce_curvature();
+    gaps_.keep_curvature(shares[k]);
     found = search(displacement, slope, tolerance, step);
+    reduced_ = !found || k > 0;
   }
   if (!found && tangent_.limit_slopes(true)) {
     gaps_.set_multipliers(multipliers);

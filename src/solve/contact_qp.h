@@ -19,8 +19,8 @@ class ContactQp {
 
   /// Minimizes; `slope` is b, `step` receives d, the objective the multipliers. Stops where a
   /// further set would change d and the gaps by less than `tolerance` mm, or less than a tenth of
-  /// d's largest 3-vector. Where negative curvature is met, the gaps' curvature is reduced to its
-  /// semidefinite part. Returns whether a minimum was reached. Collective.
+  /// d's largest 3-vector. Where negative curvature is met, the gaps' curvature is reduced, to its
+  /// semidefinite part in the end. Returns whether a minimum was reached. Collective.
   bool solve(Vec displacement, Vec slope, double tolerance, Vec step);
   /// Returns whether the latest solve met negative curvature.
   bool reduced() const { return reduced_; }

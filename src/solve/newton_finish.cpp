@@ -8,11 +8,11 @@ using base::check;
 
 NewtonFinish::End NewtonFinish::run(Vec displacement, double accuracy, double taken, bool sure) {
   constexpr int maximum = 8;
+  End end;
   const auto measure = [&](bool last, double step) {
-    function_.evaluate(displacement, gradient_);
+    end.objective = function_.evaluate(displacement, gradient_);
     return distance_.estimate({displacement, gradient_, last, step}, accuracy);
   };
-  End end;
   end.error = measure(sure, taken);
   while (end.corrections < maximum && end.error > accuracy &&
          end.error <= farthest_correction(accuracy)) {
@@ -27,7 +27,6 @@ NewtonFinish::End NewtonFinish::run(Vec displacement, double accuracy, double ta
     }
     ++end.corrections;
   }
-  end.objective = function_.evaluate(displacement, gradient_);
   end.largest_force = discrete::largest_block(gradient_);
   return end;
 }
