@@ -22,6 +22,7 @@ ContactDescent::ContactDescent(discrete::Objective& objective, discrete::Tangent
       stiffness_(objective_.positions().part().model.contact.stiffness) {}
 
 void ContactDescent::stiffen(int times) {
+  times_ = times;
   stiffness_ = times * objective_.positions().part().model.contact.stiffness;
   programs_.set_stiffness(stiffness_);
   penalty_.set_stiffness(stiffness_);
@@ -56,6 +57,14 @@ Outcome ContactDescent::presolve(Vec displacement, double accuracy) {
   }
   outcome.iterations = iterations;
   return outcome;
+}
+
+void ContactDescent::slacken(Vec displacement) {
+  constexpr double slack = 0.01, roughly = 0.1;  // of the stiffness; mm
+  penalty_.set_multipliers({});
+  penalty_.set_stiffness(slack * stiffness_);
+  minimizer_.presolve(displacement, roughly, false);
+  penalty_.set_stiffness(stiffness_);
 }
 
 ContactDescent::End ContactDescent::approach(Vec displacement, double accuracy,

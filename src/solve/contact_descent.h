@@ -15,8 +15,11 @@ class ContactDescent {
 
   /// Takes so many times the model's stiffness as that of the penalty.
   void stiffen(int times);
+  int times() const { return times_; }  ///< the stiffness, of the model's
   /// Searches on the augmented Lagrangian of a soft penalty until the multipliers hardly move.
   Outcome presolve(Vec displacement, double accuracy);
+  /// Comes near the rest position among bodies that hardly resist, which leaves no multipliers.
+  void slacken(Vec displacement);
   /// Finds the rest position among bodies with rounded edges, which catch fewer points on either
   /// side. It is found so finely that the sides do not depend on the way to it.
   End approach(Vec displacement, double accuracy, int64_t& iterations);
@@ -35,6 +38,7 @@ class ContactDescent {
   Minimizer& minimizer_;
   ContactPenalty& penalty_;
   ContactPrograms& programs_;
+  int times_ = 1;
   double stiffness_;  // N/mm³
 };
 

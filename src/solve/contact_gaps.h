@@ -80,7 +80,7 @@ class ContactGaps {
   std::vector<State> state_;                // [gaps]
   Blocks curvature_, convex_curvature_;
   double curvature_share_ = 1;  // of curvature_ in blocks(); the rest is of convex_curvature_
-  std::vector<Vec3> moved_;  // [local points] δ, mm
+  std::vector<Vec3> moved_;     // [local points] δ, mm
   base::VecHandle forces_;
 };
 

@@ -22,7 +22,10 @@ ContactSearch::ContactSearch(discrete::Objective& objective, discrete::Tangent& 
       penalty_(objective, tangent),
       programs_(objective, tangent, solver, std::move(watch)),
       descent_(objective, tangent, minimizer, penalty_, programs_),
-      other_(objective, tangent, penalty_, programs_, descent_) {}
+      other_(objective, tangent, penalty_, programs_, descent_,
+             [this](Vec displacement, double accuracy) {
+               return settle_touching_all(displacement, accuracy);
+             }) {}
 
 std::optional<bool> ContactSearch::predict(Vec displacement, double load, Vec increment) {
   objective_.contact().bodies().restore_released();
@@ -94,28 +97,24 @@ Outcome ContactSearch::with_other(Vec displacement, double accuracy, Outcome out
   return outcome;
 }
 
-Outcome ContactSearch::run(Vec displacement, double accuracy) {
-  constexpr int max_rounds = 8, max_left = 20, stiffest = 16;
+/// Ends at rest by rounds of programs from a position near it: after a soft search where they do
+/// not reach it, with a stiffer penalty in each round. Collective.
+Outcome ContactSearch::settle(Vec displacement, double accuracy, int max_rounds,
+                              bool needs_presolve) {
+  constexpr int max_left = 20, stiffest = 16;
   constexpr double steady = 0.98;  // ratio of the gaps that rounds leave where nothing closes them
+  constexpr double none = std::numeric_limits<double>::infinity();
   Outcome outcome;
-  other_.begin(displacement);
-  if (!std::exchange(predicted_, false)) {
-    outcome = descent_.finish(displacement, accuracy);
-    if (outcome.converged) return with_other(displacement, accuracy, std::move(outcome));
-  }
-  int times = 1;  // stiffness of the penalty
-  descent_.stiffen(times);
   int64_t iterations = 0;
-  int left = 0;                                             // saddles
-  double saddle = std::numeric_limits<double>::infinity();  // value at the latest of them
-  bool needs_presolve = false, led_out = false;
-  double missing = std::numeric_limits<double>::infinity();  // mm of gaps
+  int times = 1, left = 0;  // stiffness of the penalty; saddles
+  double saddle = none;     // value at the latest of them
+  bool led_out = false;
+  double missing = none;  // mm of gaps
   const auto leaves = [&] {
     needs_presolve = false;
     return left++ < max_left && leave_lower_saddle(displacement, saddle);
   };
-  if (descent_.approach(displacement, accuracy, iterations) == End::stopped)
-    return stopped(displacement, outcome);
+  descent_.stiffen(times);
   for (int round = 0; round < max_rounds;) {
     if (needs_presolve) {
       const Outcome near = descent_.presolve(displacement, accuracy);
@@ -133,7 +132,7 @@ Outcome ContactSearch::run(Vec displacement, double accuracy) {
     if (missing > steady * before) {
       const bool leads = !std::exchange(led_out, true) && lead_out(displacement, accuracy);
       if (leads || release_overlapped(accuracy)) {
-        missing = std::numeric_limits<double>::infinity();
+        missing = none;
         needs_presolve = !leads;
         continue;
       }
@@ -143,6 +142,39 @@ Outcome ContactSearch::run(Vec displacement, double accuracy) {
     ++round;
   }
   outcome.iterations += iterations;
+  return outcome;
+}
+
+/// Settles without points that are released from a body: these have less energy than the rest
+/// position that it is to be compared with. Collective.
+Outcome ContactSearch::settle_touching_all(Vec displacement, double accuracy) {
+  constexpr int max_rounds = 4;
+  const int times = descent_.times();
+  Outcome outcome = settle(displacement, accuracy, max_rounds, true);
+  descent_.stiffen(times);
+  mechanics::BodyContact& contact = objective_.contact().bodies();
+  if (base::on_any_rank(objective_.positions().comm(), contact.count_released() > 0)) {
+    contact.restore_released();
+    outcome.converged = false;
+  }
+  return outcome;
+}
+
+Outcome ContactSearch::run(Vec displacement, double accuracy) {
+  constexpr int max_rounds = 8;
+  Outcome outcome;
+  other_.begin(displacement);
+  if (!std::exchange(predicted_, false)) {
+    outcome = descent_.finish(displacement, accuracy);
+    if (outcome.converged) return with_other(displacement, accuracy, std::move(outcome));
+  }
+  int64_t iterations = 0;
+  descent_.stiffen(1);
+  if (descent_.approach(displacement, accuracy, iterations) == End::stopped)
+    return stopped(displacement, outcome);
+  outcome = settle(displacement, accuracy, max_rounds, false);
+  outcome.iterations += iterations;
+  if (outcome.stopped) return outcome;
   if (!outcome.converged && outcome.displacement_error > accuracy)
     outcome.reason =
         fmt::format("contact did not converge: {:.3g} mm of gaps remain", penalty_.violation());

@@ -10,10 +10,9 @@ namespace repose::solve {
 /// on to the bodies themselves, multipliers included. Where these fail, they are repeated after
 /// finer soft searches, with a stiffer penalty; points between bodies that overlap are led out
 /// round an edge, or released from one of them. The multipliers of a load are where the next
-/// begins. At load 1, where points press near an edge of a body, quadratic programs start from
-/// where the search did, too: where this ends elsewhere, the rest position of less energy is taken,
-/// and the outcome states the distance of the other. Then single points are tried on the other side
-/// of the edge that they press near.
+/// begins. At load 1, where points press near an edge of a body, other rest positions are searched
+/// for (OtherRestSearch): that of least energy is taken, and the outcome states the distance of
+/// another.
 class ContactSearch : public RestSearch {
  public:
   /// `tangent` is the objective's Hessian, `solver` solves with it, `minimizer` minimizes
@@ -33,6 +32,8 @@ class ContactSearch : public RestSearch {
 
  private:
   using End = ContactPrograms::End;
+  Outcome settle(Vec displacement, double accuracy, int max_rounds, bool needs_presolve);
+  Outcome settle_touching_all(Vec displacement, double accuracy);
   Outcome with_other(Vec displacement, double accuracy, Outcome outcome);
   Outcome stopped(Vec displacement, Outcome outcome);
   bool release_overlapped(double accuracy);

@@ -11,19 +11,31 @@ namespace repose::solve {
 
 using base::check;
 
+namespace {
+
+/// Returns true if an energy is less than that of the rest position so far, by more than rounding.
+bool is_less(double value, double value_here) {
+  constexpr double rounding = 1e-6;
+  return value < value_here - rounding * std::abs(value_here);
+}
+
+}  // namespace
+
 OtherRestSearch::OtherRestSearch(discrete::Objective& objective, discrete::Tangent& tangent,
                                  ContactPenalty& penalty, ContactPrograms& programs,
-                                 ContactDescent& descent)
+                                 ContactDescent& descent, Settle settle)
     : objective_(objective),
       tangent_(tangent),
       penalty_(penalty),
       programs_(programs),
       descent_(descent),
+      settle_(std::move(settle)),
+      prediction_(objective.positions().make_vector()),
       start_(objective.positions().make_vector()) {}
 
 void OtherRestSearch::begin(Vec prediction) {
   at_prediction_ = penalty_.multipliers();
-  check(VecCopy(prediction, start_));
+  check(VecCopy(prediction, prediction_));
 }
 
 /// Returns the bodies on which points press near edges, ascending. Collective.
@@ -71,36 +83,39 @@ std::vector<Vec3> OtherRestSearch::displacements(Vec state) {
   return found;
 }
 
-/// Searches for the rest position that quadratic programs lead to from the prediction, without
-/// rounded bodies. Where it is another one, `displacement` becomes that of less energy, and
-/// `outcome` states the distance to the other.
-void OtherRestSearch::consider_other(Vec displacement, double accuracy, Outcome& outcome) {
+/// Searches from start_ for a rest position. Returns true where it ends at one; `there` is
+/// converged if that has less energy than `value_here`. Collective.
+bool OtherRestSearch::search(double accuracy, double value_here, Outcome& there) {
+  int64_t iterations = 0;
+  const End end = programs_.run(start_, accuracy, iterations);
+  if (is_less(programs_.evaluate(start_), value_here)) {
+    if (end == End::reached) there = descent_.finish_reached(start_, accuracy, iterations);
+    if (end == End::failed) there = settle_(start_, accuracy);
+  }
+  there.iterations += iterations;
+  return end == End::reached || there.converged;
+}
+
+/// Searches for the rest position that quadratic programs lead to from a start, without rounded
+/// bodies. Where it is another one, `displacement` becomes that of less energy, and `outcome`
+/// states the distance to the other. Collective.
+void OtherRestSearch::consider(Start start, Vec displacement, double accuracy, Outcome& outcome) {
   const ContactPressures here = penalty_.multipliers();
   const double value_here = programs_.evaluate(displacement);
+  check(VecCopy(prediction_, start_));
   penalty_.set_multipliers(at_prediction_);
-  int64_t iterations = 0;
-  bool taken = false;
-  End end = programs_.run(start_, accuracy, iterations);
-  if (end == End::failed && !descent_.presolve(start_, accuracy).stopped)
-    end = programs_.run(start_, accuracy, iterations);
-  if (end == End::reached) {
-    OtherRest other = compare_skins(displacement, displacements(start_));
-    const bool is_less = programs_.evaluate(start_) < value_here;
-    const bool is_other = other.distance > 2 * accuracy;
-    Outcome there;
-    if (is_other && is_less) there = descent_.finish_reached(start_, accuracy, iterations);
-    taken = there.converged;
-    there.iterations += outcome.iterations + iterations;
-    if (taken) outcome = there;
-    if (is_other && taken == is_less) {
-      if (taken) other.displacement = displacements(displacement);
-      outcome.other = std::move(other);
-    }
+  if (start == Start::slack) descent_.slacken(start_);
+  Outcome there;
+  const bool found = search(accuracy, value_here, there);
+  const bool less = is_less(programs_.evaluate(start_), value_here);
+  OtherRest other = compare_skins(displacement, displacements(start_));
+  const bool is_other = found && other.distance > 2 * accuracy;
+  if (is_other && less && there.converged) {
+    take_other(displacement, accuracy, std::move(there), outcome);
+    return;
   }
-  if (taken)
-    check(VecCopy(start_, displacement));
-  else
-    penalty_.set_multipliers(here);
+  if (is_other && !less) keep_farther(std::move(other), outcome);
+  penalty_.set_multipliers(here);
 }
 
 /// Searches from `displacement` with one point beyond the other side of its body; ends in start_.
@@ -111,7 +126,6 @@ OtherRestSearch::End OtherRestSearch::change_side(const OtherSide* side, Vec dis
   // Of the work of the contact's force over the gap: after the program, which is not exact, and
   // after a further step.
   constexpr double promising = 0.4, still_promising = 0.1;
-  constexpr double rounding = 1e-6;  // of the value
   check(VecCopy(displacement, start_));
   const double value_here = programs_.evaluate(start_);
   const double energy_here = programs_.without_contact(value_here);
@@ -128,11 +142,12 @@ OtherRestSearch::End OtherRestSearch::change_side(const OtherSide* side, Vec dis
   if (programs_.evaluate_tissue(start_) > energy_here + promising * work) return End::failed;
   int64_t iterations = 0;
   End end = programs_.run(start_, accuracy, iterations, 1);
-  if (end == End::failed &&
-      programs_.evaluate_tissue(start_) <= energy_here + still_promising * work)
-    end = programs_.run(start_, accuracy, iterations);
   const double value = programs_.evaluate(start_);
-  const bool less = value < value_here - rounding * std::abs(value_here);
+  const double most = energy_here + still_promising * work;
+  if (end == End::failed &&
+      (is_less(value, value_here) || programs_.without_contact(value) <= most))
+    end = programs_.run(start_, accuracy, iterations);
+  const bool less = is_less(programs_.evaluate(start_), value_here);
   return end == End::reached && !less ? End::failed : end;
 }
 
@@ -178,7 +193,8 @@ void OtherRestSearch::find(Vec displacement, double accuracy, Outcome& outcome) 
   if (bodies.empty()) return;
   const int64_t evaluated = objective_.evaluations();
   std::set<size_t> tried;
-  consider_other(displacement, accuracy, outcome);
+  consider(Start::prediction, displacement, accuracy, outcome);
+  consider(Start::slack, displacement, accuracy, outcome);
   for (int pass = 0; pass < max_passes; ++pass)
     if (!change_sides(displacement, accuracy, tried, outcome)) break;
   if (outcome.other) outcome.other->bodies = bodies;
@@ -186,18 +202,22 @@ void OtherRestSearch::find(Vec displacement, double accuracy, Outcome& outcome) 
   evaluations_ += objective_.evaluations() - evaluated;
 }
 
-/// Takes start_, which ended in `there`, in place of `displacement`. Of this and the other rest
-/// position so far, the one that is farther away is the outcome's other one.
+/// Of two other rest positions keeps the one that is farther away.
+void OtherRestSearch::keep_farther(OtherRest other, Outcome& outcome) {
+  if (!outcome.other || outcome.other->distance < other.distance) outcome.other = std::move(other);
+}
+
+/// Takes start_, which ended in `there`, in place of `displacement`, which becomes another one.
 void OtherRestSearch::take_other(Vec displacement, double accuracy, Outcome there,
                                  Outcome& outcome) {
-  OtherRest other = compare_skins(start_, displacements(displacement));
-  if (outcome.other) {
-    OtherRest earlier = compare_skins(start_, std::move(outcome.other->displacement));
-    if (earlier.distance > other.distance) other = std::move(earlier);
-  }
+  const auto keep = [&](std::vector<Vec3> displacements) {
+    OtherRest other = compare_skins(start_, std::move(displacements));
+    if (other.distance > 2 * accuracy) keep_farther(std::move(other), there);
+  };
+  keep(displacements(displacement));
+  if (outcome.other) keep(std::move(outcome.other->displacement));
   there.iterations += outcome.iterations;
   outcome = std::move(there);
-  if (other.distance > 2 * accuracy) outcome.other = std::move(other);
   check(VecCopy(start_, displacement));
 }
 

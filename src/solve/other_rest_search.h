@@ -1,6 +1,7 @@
 #pragma once
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <set>
 #include <vector>
 
@@ -10,12 +11,17 @@
 namespace repose::solve {
 
 /// Finds other rest positions of tissue that presses on bodies near edges of these
-/// (docs/theory/contact.md): by programs from the prediction without rounded bodies, then with
-/// single points on the other side of the edge that they press near. All members collective.
+/// (docs/theory/contact.md): by programs without rounded bodies from the prediction, and from where
+/// tissue rests among bodies that hardly resist; then with single points on the other side of the
+/// edge that they press near. All members collective.
 class OtherRestSearch {
  public:
+  /// Finds rest from a position, with an accuracy, mm, where programs alone do not.
+  using Settle = std::function<Outcome(Vec, double)>;
+
   OtherRestSearch(discrete::Objective& objective, discrete::Tangent& tangent,
-                  ContactPenalty& penalty, ContactPrograms& programs, ContactDescent& descent);
+                  ContactPenalty& penalty, ContactPrograms& programs, ContactDescent& descent,
+                  Settle settle);
 
   /// Keeps a prediction, with the multipliers there, as what programs start from.
   void begin(Vec prediction);
@@ -27,10 +33,13 @@ class OtherRestSearch {
  private:
   using End = ContactPrograms::End;
   std::vector<int32_t> pressed_near_edges(Vec displacement);
-  void consider_other(Vec displacement, double accuracy, Outcome& outcome);
+  enum class Start { prediction, slack };
+  bool search(double accuracy, double value_here, Outcome& there);
+  void consider(Start start, Vec displacement, double accuracy, Outcome& outcome);
   End change_side(const OtherSide* side, Vec displacement, double accuracy);
   bool change_sides(Vec displacement, double accuracy, std::set<size_t>& tried, Outcome& outcome);
   void take_other(Vec displacement, double accuracy, Outcome there, Outcome& outcome);
+  void keep_farther(OtherRest other, Outcome& outcome);
   OtherRest compare_skins(Vec displacement, std::vector<Vec3> other);
   std::vector<Vec3> displacements(Vec state);
 
@@ -39,9 +48,10 @@ class OtherRestSearch {
   ContactPenalty& penalty_;
   ContactPrograms& programs_;
   ContactDescent& descent_;
+  Settle settle_;
   int64_t evaluations_ = 0;
   ContactPressures at_prediction_;
-  base::VecHandle start_;
+  base::VecHandle prediction_, start_;
 };
 
 }  // namespace repose::solve

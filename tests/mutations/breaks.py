@@ -466,4 +466,10 @@ BREAKS = [
         "constexpr int max_tried = 0;",
         r"^program\.contact$",
     ),
+    (
+        "rest positions are searched for from the prediction alone",
+        "  consider(Start::slack, displacement, accuracy, outcome);\n",
+        "",
+        r"^program\.contact$",
+    ),
 ]

@@ -139,6 +139,23 @@ def test_points_at_an_edge_go_to_the_side_of_less_energy_on_any_ranks(folder, en
     assert np.linalg.norm(faces[1] - faces[0], axis=1).max() < 0.01
 
 
+@real_head
+@pytest.mark.long
+def test_fused_lips_across_an_incisor_rest_where_they_have_less_energy(folder, environment):
+    """On the other side of its edge, 1 mm away, the lower lip has 0.026 N mm more. No point goes round it
+    alone, and programs from the prediction do not lead there."""
+    run = runner(folder, environment)
+    scene = (folder / "real_head_genioplasty.yaml").read_text()
+    moves = "  - {bone: mandible, translate: [0, -5, 0]}\n  - {bone: chin, translate: [0, -4.9, 0]}\n"
+    (folder / "lips.yaml").write_text(scene.partition("moves:\n")[0] + "moves:\n" + moves)
+    for ranks in (1, 2):
+        done = run("repose-solve", "lips.yaml", "-accuracy", 0.01, "-output", "lips", ranks=ranks)
+        assert (done.returncode, done.stderr) == (0, ""), done
+        assert last(folder / "lips.h5")["objective"] == pytest.approx(19.872, abs=2e-3)
+        (distance, *_), = np.array(OTHER.findall(done.stdout), float)
+        assert distance == pytest.approx(0.97, abs=0.1)
+
+
 @pytest.mark.long
 @real_head
 def test_a_split_jaw_with_parted_lips_is_solved_and_nothing_is_folded(solve):
