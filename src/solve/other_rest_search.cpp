@@ -83,19 +83,6 @@ std::vector<Vec3> OtherRestSearch::displacements(Vec state) {
   return found;
 }
 
-/// Searches from start_ for a rest position. Returns true where it ends at one; `there` is
-/// converged if that has less energy than `value_here`. Collective.
-bool OtherRestSearch::search(double accuracy, double value_here, Outcome& there) {
-  int64_t iterations = 0;
-  const End end = programs_.run(start_, accuracy, iterations);
-  if (is_less(programs_.evaluate(start_), value_here)) {
-    if (end == End::reached) there = descent_.finish_reached(start_, accuracy, iterations);
-    if (end == End::failed) there = settle_(start_, accuracy);
-  }
-  there.iterations += iterations;
-  return end == End::reached || there.converged;
-}
-
 /// Searches for the rest position that quadratic programs lead to from a start, without rounded
 /// bodies. Where it is another one, `displacement` becomes that of less energy, and `outcome`
 /// states the distance to the other. Collective.
@@ -105,16 +92,21 @@ void OtherRestSearch::consider(Start start, Vec displacement, double accuracy, O
   check(VecCopy(prediction_, start_));
   penalty_.set_multipliers(at_prediction_);
   if (start == Start::slack) descent_.slacken(start_);
-  Outcome there;
-  const bool found = search(accuracy, value_here, there);
+  int64_t iterations = 0;
+  const End end = programs_.run(start_, accuracy, iterations);
   const bool less = is_less(programs_.evaluate(start_), value_here);
   OtherRest other = compare_skins(displacement, displacements(start_));
-  const bool is_other = found && other.distance > 2 * accuracy;
-  if (is_other && less && there.converged) {
+  const bool is_other = other.distance > 2 * accuracy;
+  Outcome there;
+  if (is_other && less && end == End::reached)
+    there = descent_.finish_reached(start_, accuracy, iterations);
+  if (is_other && less && end == End::failed) there = settle_(start_, accuracy);
+  there.iterations += iterations;
+  if (there.converged && is_less(there.objective, value_here)) {
     take_other(displacement, accuracy, std::move(there), outcome);
     return;
   }
-  if (is_other && !less) keep_farther(std::move(other), outcome);
+  if (is_other && !less && end == End::reached) keep_farther(std::move(other), outcome);
   penalty_.set_multipliers(here);
 }
 
@@ -202,7 +194,7 @@ void OtherRestSearch::find(Vec displacement, double accuracy, Outcome& outcome) 
   evaluations_ += objective_.evaluations() - evaluated;
 }
 
-/// Of two other rest positions keeps the one that is farther away.
+/// Keeps the farther of two other rest positions.
 void OtherRestSearch::keep_farther(OtherRest other, Outcome& outcome) {
   if (!outcome.other || outcome.other->distance < other.distance) outcome.other = std::move(other);
 }

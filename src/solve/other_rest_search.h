@@ -34,7 +34,6 @@ class OtherRestSearch {
   using End = ContactPrograms::End;
   std::vector<int32_t> pressed_near_edges(Vec displacement);
   enum class Start { prediction, slack };
-  bool search(double accuracy, double value_here, Outcome& there);
   void consider(Start start, Vec displacement, double accuracy, Outcome& outcome);
   End change_side(const OtherSide* side, Vec displacement, double accuracy);
   bool change_sides(Vec displacement, double accuracy, std::set<size_t>& tried, Outcome& outcome);
