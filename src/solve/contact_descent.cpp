@@ -1,6 +1,10 @@
 #include "contact_descent.h"
 
 #include <algorithm>
+#include <limits>
+#include <utility>
+
+#include "repose/base/collective.h"
 
 namespace repose::solve {
 
@@ -44,6 +48,7 @@ double ContactDescent::harden(Vec displacement) {
   return left;
 }
 
+/// Searches on the augmented Lagrangian of a soft penalty until the multipliers hardly move.
 Outcome ContactDescent::presolve(Vec displacement, double accuracy) {
   constexpr int maximum = 5;
   constexpr double small = 0.05;  // mm of gaps
@@ -87,6 +92,8 @@ Outcome ContactDescent::finish(Vec displacement, double accuracy) {
       minimizer_.finish(displacement, (1 - missed) * accuracy, programs_.take_last_step());
   objective_.positions().update(displacement);
   outcome.displacement_error += contact_safety * penalty_.violation();
+  outcome.overlapped = base::sum_over_ranks(objective_.positions().comm(),
+                                            objective_.contact().bodies().count_released());
   outcome.converged = outcome.converged && outcome.displacement_error <= accuracy;
   return outcome;
 }
@@ -100,6 +107,87 @@ Outcome ContactDescent::finish_reached(Vec displacement, double accuracy, int64_
     if (programs_.run(displacement, to *= finer, iterations) != End::reached) break;
     outcome = finish(displacement, accuracy);
   }
+  return outcome;
+}
+
+/// Releases points between bodies that overlap from one of them. Returns true if there are any.
+/// Collective.
+bool ContactDescent::release_overlapped(double accuracy) {
+  discrete::Positions& positions = objective_.positions();
+  mechanics::BodyContact& contact = objective_.contact().bodies();
+  contact.update_gaps(positions.local());
+  const bool any = base::on_any_rank(positions.comm(), contact.release_overlapped(accuracy));
+  if (any) tangent_.forget_contact();
+  return any;
+}
+
+/// Leads points between bodies that overlap out round an edge of one of them. Returns true if there
+/// are any that have such a way. Collective.
+bool ContactDescent::lead_out(Vec displacement, double accuracy) {
+  discrete::Positions& positions = objective_.positions();
+  programs_.evaluate(displacement);
+  programs_.linearize(displacement);
+  const auto ways = objective_.contact().bodies().ways_out(positions.local(), accuracy);
+  if (!base::on_any_rank(positions.comm(), !ways.empty())) return false;
+  const bool found = programs_.step_with(ways, displacement);
+  tangent_.forget_contact();
+  return found;
+}
+
+Outcome ContactDescent::stopped(Vec displacement, Outcome outcome) {
+  outcome.converged = false;
+  outcome.stopped = true;
+  outcome.reason = stopped_reason;
+  outcome.stable = !programs_.reduced();
+  outcome.displacement_error = std::numeric_limits<double>::infinity();
+  outcome.objective = programs_.evaluate(displacement);
+  outcome.gradient_max = programs_.largest_force();
+  return outcome;
+}
+
+Outcome ContactDescent::settle(Vec displacement, double accuracy, int max_rounds,
+                               bool needs_presolve) {
+  constexpr int max_left = 20, stiffest = 16;
+  constexpr double steady = 0.98;  // ratio of the gaps that rounds leave where nothing closes them
+  constexpr double none = std::numeric_limits<double>::infinity();
+  Outcome outcome;
+  int64_t iterations = 0;
+  int times = 1, left = 0;  // stiffness of the penalty; saddles
+  double saddle = none;     // value at the latest of them
+  bool led_out = false;
+  double missing = none;  // mm of gaps
+  const auto leaves = [&] {
+    needs_presolve = false;
+    return left++ < max_left && programs_.leave_lower_saddle(displacement, saddle);
+  };
+  stiffen(times);
+  for (int round = 0; round < max_rounds;) {
+    if (needs_presolve) {
+      const Outcome near = presolve(displacement, accuracy);
+      iterations += near.iterations;
+      if (near.stopped) return stopped(displacement, outcome);
+    }
+    const End end = programs_.run(displacement, accuracy, iterations);
+    if (end == End::stopped) return stopped(displacement, outcome);
+    if (end == End::failed && programs_.reduced() && leaves()) continue;
+    outcome = end == End::reached ? finish_reached(displacement, accuracy, iterations)
+                                  : finish(displacement, accuracy);
+    if (outcome.converged) break;
+    if (!outcome.stable && leaves()) continue;
+    const double before = std::exchange(missing, penalty_.violation());
+    if (missing > steady * before) {
+      const bool leads = !std::exchange(led_out, true) && lead_out(displacement, accuracy);
+      if (leads || release_overlapped(accuracy)) {
+        missing = none;
+        needs_presolve = !leads;
+        continue;
+      }
+    }
+    needs_presolve = end != End::reached;
+    stiffen(times = std::min(2 * times, stiffest));
+    ++round;
+  }
+  outcome.iterations += iterations;
   return outcome;
 }
 

@@ -4,8 +4,8 @@
 
 namespace repose::solve {
 
-/// Stages of a search with contact: soft quasi-Newton searches, programs among rounded bodies, and
-/// the estimate that ends it. All members collective.
+/// Stages of a search with contact: soft quasi-Newton searches, programs among rounded bodies,
+/// rounds of programs, and the estimate that ends it. All members collective.
 class ContactDescent {
  public:
   using End = ContactPrograms::End;
@@ -16,8 +16,6 @@ class ContactDescent {
   /// Takes so many times the model's stiffness as that of the penalty.
   void stiffen(int times);
   int times() const { return times_; }  ///< the stiffness, of the model's
-  /// Searches on the augmented Lagrangian of a soft penalty until the multipliers hardly move.
-  Outcome presolve(Vec displacement, double accuracy);
   /// Comes near the rest position among bodies that hardly resist, which leaves no multipliers.
   void slacken(Vec displacement);
   /// Finds the rest position among bodies with rounded edges, which catch fewer points on either
@@ -28,8 +26,16 @@ class ContactDescent {
   /// finish() at a position that programs have reached. They go on where it misses the accuracy: an
   /// end before the next step relies on what that step is expected to be.
   Outcome finish_reached(Vec displacement, double accuracy, int64_t& iterations);
+  /// Ends at rest by rounds of programs from a position near it: after a soft search where they do
+  /// not reach it, with a stiffer penalty in each round.
+  Outcome settle(Vec displacement, double accuracy, int max_rounds, bool needs_presolve);
+  /// Returns the outcome of a search that is stopped at `displacement`.
+  Outcome stopped(Vec displacement, Outcome outcome = {});
 
  private:
+  Outcome presolve(Vec displacement, double accuracy);
+  bool release_overlapped(double accuracy);
+  bool lead_out(Vec displacement, double accuracy);
   void soften();
   double harden(Vec displacement);
 

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "leave_saddle.h"
+
 namespace repose::solve {
 
 using base::check;
@@ -17,6 +19,8 @@ constexpr double predicted_to = 0.1;  // mm
 ContactPrograms::ContactPrograms(discrete::Objective& objective, discrete::Tangent& tangent,
                                  linear::TangentSolver& solver, Minimizer::Watch watch)
     : objective_(objective),
+      tangent_(tangent),
+      solver_(solver),
       qp_(objective, tangent, solver),
       watch_(std::move(watch)),
       gradient_(objective.positions().make_vector()),
@@ -105,6 +109,15 @@ ContactPrograms::End ContactPrograms::run(Vec displacement, double accuracy, int
       return End::stopped;
   }
   return End::failed;
+}
+
+bool ContactPrograms::leave_lower_saddle(Vec displacement, double& latest) {
+  constexpr double lower = 1e-6;  // of the value
+  tangent_.forget_contact();
+  const double value = evaluate(displacement);
+  if (!(value < latest - lower * std::abs(value))) return false;
+  latest = value;
+  return leave_saddle(objective_, solver_, displacement);
 }
 
 void ContactPrograms::linearize(Vec displacement) {

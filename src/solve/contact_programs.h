@@ -27,6 +27,10 @@ class ContactPrograms {
   /// Returns the full step that the latest run ended with, mm, or 0; from then on 0.
   double take_last_step() { return std::exchange(last_step_, 0.0); }
 
+  /// Leaves a saddle, unless its value is no less than that of the `latest` one, to which the
+  /// search may have returned.
+  bool leave_lower_saddle(Vec displacement, double& latest);
+
   /// Evaluates the augmented Lagrangian, N mm.
   double evaluate(Vec displacement) { return objective_.evaluate(displacement, gradient_); }
   /// N, largest block of the gradient that was evaluated last.
@@ -47,6 +51,8 @@ class ContactPrograms {
   double take_step(Vec displacement, double length, double tissue, double& value);
 
   discrete::Objective& objective_;
+  discrete::Tangent& tangent_;
+  linear::TangentSolver& solver_;
   ContactQp qp_;
   Minimizer::Watch watch_;
   double last_step_ = 0;

@@ -19,30 +19,23 @@ class ContactSearch : public RestSearch {
   /// it.
   ContactSearch(discrete::Objective& objective, discrete::Tangent& tangent,
                 linear::TangentSolver& solver, Minimizer& minimizer, Minimizer::Watch watch);
-  /// Sets if another rest position is searched for at load 1 (the default).
-  void find_other_rest(bool requested) { finds_other_ = requested; }
-  /// Returns the evaluations that this search took.
+  /// Sets if find_other() searches (the default).
+  void enable_other_rest(bool enabled) { finds_other_ = enabled; }
+  /// Returns the evaluations of find_other().
   int64_t evaluations_for_other() const { return other_.evaluations(); }
   std::optional<bool> predict(Vec displacement, double load, Vec increment) override;
   Outcome run(Vec displacement, double accuracy) override;
   /// By quadratic programs alone, as long as they serve.
   Outcome run_near(Vec displacement, double accuracy) override;
+  void find_other(Vec displacement, double accuracy, Outcome& outcome) override;
   ContactPressures pressures() const override { return penalty_.multipliers(); }
   void set_pressures(const ContactPressures& to) override { penalty_.set_multipliers(to); }
 
  private:
   using End = ContactPrograms::End;
-  Outcome settle(Vec displacement, double accuracy, int max_rounds, bool needs_presolve);
-  Outcome settle_touching_all(Vec displacement, double accuracy);
-  Outcome with_other(Vec displacement, double accuracy, Outcome outcome);
-  Outcome stopped(Vec displacement, Outcome outcome);
-  bool release_overlapped(double accuracy);
-  bool lead_out(Vec displacement, double accuracy);
-  bool leave_lower_saddle(Vec displacement, double& latest);
 
   discrete::Objective& objective_;
   discrete::Tangent& tangent_;
-  linear::TangentSolver& solver_;
   ContactPenalty penalty_;
   ContactPrograms programs_;
   ContactDescent descent_;

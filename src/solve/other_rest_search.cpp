@@ -23,13 +23,12 @@ bool is_less(double value, double value_here) {
 
 OtherRestSearch::OtherRestSearch(discrete::Objective& objective, discrete::Tangent& tangent,
                                  ContactPenalty& penalty, ContactPrograms& programs,
-                                 ContactDescent& descent, Settle settle)
+                                 ContactDescent& descent)
     : objective_(objective),
       tangent_(tangent),
       penalty_(penalty),
       programs_(programs),
       descent_(descent),
-      settle_(std::move(settle)),
       prediction_(objective.positions().make_vector()),
       start_(objective.positions().make_vector()) {}
 
@@ -83,26 +82,37 @@ std::vector<Vec3> OtherRestSearch::displacements(Vec state) {
   return found;
 }
 
-/// Searches for the rest position that quadratic programs lead to from a start, without rounded
+/// Settles without points that are released from a body: these have less energy than the rest
+/// position that it is to be compared with. Collective.
+Outcome OtherRestSearch::settle(Vec displacement, double accuracy) {
+  constexpr int max_rounds = 4;
+  const int times = descent_.times();
+  Outcome outcome = descent_.settle(displacement, accuracy, max_rounds, true);
+  descent_.stiffen(times);
+  mechanics::BodyContact& contact = objective_.contact().bodies();
+  if (base::on_any_rank(objective_.positions().comm(), contact.count_released() > 0)) {
+    contact.restore_released();
+    outcome.converged = false;
+  }
+  return outcome;
+}
+
+/// Searches for the rest position that quadratic programs lead to from start_, without rounded
 /// bodies. Where it is another one, `displacement` becomes that of less energy, and `outcome`
-/// states the distance to the other. Collective.
-void OtherRestSearch::consider(Start start, Vec displacement, double accuracy, Outcome& outcome) {
-  const ContactPressures here = penalty_.multipliers();
-  const double value_here = programs_.evaluate(displacement);
-  check(VecCopy(prediction_, start_));
-  penalty_.set_multipliers(at_prediction_);
-  if (start == Start::slack) descent_.slacken(start_);
+/// states the distance to the other; the multipliers at `displacement` are `here`. Collective.
+void OtherRestSearch::consider(Vec displacement, const ContactPressures& here, double accuracy,
+                               Outcome& outcome) {
   int64_t iterations = 0;
   const End end = programs_.run(start_, accuracy, iterations);
-  const bool less = is_less(programs_.evaluate(start_), value_here);
+  const bool less = is_less(programs_.evaluate(start_), outcome.objective);
   OtherRest other = compare_skins(displacement, displacements(start_));
   const bool is_other = other.distance > 2 * accuracy;
   Outcome there;
   if (is_other && less && end == End::reached)
     there = descent_.finish_reached(start_, accuracy, iterations);
-  if (is_other && less && end == End::failed) there = settle_(start_, accuracy);
+  if (is_other && less && end == End::failed) there = settle(start_, accuracy);
   there.iterations += iterations;
-  if (there.converged && is_less(there.objective, value_here)) {
+  if (there.converged && is_less(there.objective, outcome.objective)) {
     take_other(displacement, accuracy, std::move(there), outcome);
     return;
   }
@@ -181,12 +191,18 @@ bool OtherRestSearch::change_sides(Vec displacement, double accuracy, std::set<s
 
 void OtherRestSearch::find(Vec displacement, double accuracy, Outcome& outcome) {
   constexpr int max_passes = 3;  // after a change, other points may follow
+  if (!outcome.converged || outcome.overlapped > 0) return;
   const std::vector<int32_t> bodies = pressed_near_edges(displacement);
   if (bodies.empty()) return;
   const int64_t evaluated = objective_.evaluations();
   std::set<size_t> tried;
-  consider(Start::prediction, displacement, accuracy, outcome);
-  consider(Start::slack, displacement, accuracy, outcome);
+  for (const bool slack : {false, true}) {
+    const ContactPressures here = penalty_.multipliers();
+    check(VecCopy(prediction_, start_));
+    penalty_.set_multipliers(at_prediction_);
+    if (slack) descent_.slacken(start_);
+    consider(displacement, here, accuracy, outcome);
+  }
   for (int pass = 0; pass < max_passes; ++pass)
     if (!change_sides(displacement, accuracy, tried, outcome)) break;
   if (outcome.other) outcome.other->bodies = bodies;

@@ -1,7 +1,6 @@
 #pragma once
 #include <cstddef>
 #include <cstdint>
-#include <functional>
 #include <set>
 #include <vector>
 
@@ -16,12 +15,8 @@ namespace repose::solve {
 /// edge that they press near. All members collective.
 class OtherRestSearch {
  public:
-  /// Finds rest from a position, with an accuracy, mm, where programs alone do not.
-  using Settle = std::function<Outcome(Vec, double)>;
-
   OtherRestSearch(discrete::Objective& objective, discrete::Tangent& tangent,
-                  ContactPenalty& penalty, ContactPrograms& programs, ContactDescent& descent,
-                  Settle settle);
+                  ContactPenalty& penalty, ContactPrograms& programs, ContactDescent& descent);
 
   /// Keeps a prediction, with the multipliers there, as what programs start from.
   void begin(Vec prediction);
@@ -33,8 +28,8 @@ class OtherRestSearch {
  private:
   using End = ContactPrograms::End;
   std::vector<int32_t> pressed_near_edges(Vec displacement);
-  enum class Start { prediction, slack };
-  void consider(Start start, Vec displacement, double accuracy, Outcome& outcome);
+  Outcome settle(Vec displacement, double accuracy);
+  void consider(Vec displacement, const ContactPressures& here, double accuracy, Outcome& outcome);
   End change_side(const OtherSide* side, Vec displacement, double accuracy);
   bool change_sides(Vec displacement, double accuracy, std::set<size_t>& tried, Outcome& outcome);
   void take_other(Vec displacement, double accuracy, Outcome there, Outcome& outcome);
@@ -47,7 +42,6 @@ class OtherRestSearch {
   ContactPenalty& penalty_;
   ContactPrograms& programs_;
   ContactDescent& descent_;
-  Settle settle_;
   int64_t evaluations_ = 0;
   ContactPressures at_prediction_;
   base::VecHandle prediction_, start_;

@@ -148,7 +148,7 @@ class Searcher {
     if (problem_.objective().positions().part().contact)
       contact_.emplace(problem_.objective(), problem_.tangent(), problem_.elastic_solver(),
                        minimizer_, std::ref(watcher_));
-    if (contact_) contact_->find_other_rest(settings.finds_other_rest);
+    if (contact_) contact_->enable_other_rest(settings.finds_other_rest);
   }
 
   RestSearch& search() {

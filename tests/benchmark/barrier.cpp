@@ -317,7 +317,7 @@ base::Exit run(const base::Options& options) {
     solve::Minimizer minimizer(problem.function(), problem.solver(), nullptr);
     solve::ContactSearch contact(problem.objective(), problem.tangent(), problem.elastic_solver(),
                                  minimizer, nullptr);
-    contact.find_other_rest(false);
+    contact.enable_other_rest(false);
     const base::VecHandle displacement = problem.objective().positions().make_vector();
     const auto found = solve::LoadPath(problem, contact, settings.path)
                            .run(displacement, nullptr, [](const auto&, double, double) {});

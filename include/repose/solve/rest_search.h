@@ -72,6 +72,10 @@ class RestSearch {
   virtual Outcome run_near(Vec displacement, double accuracy) {
     return run(displacement, accuracy);
   }
+  /// Searches for other rest positions of the load of the search that ended at `displacement` with
+  /// this outcome. These become the position of least energy, with its outcome, which states the
+  /// distance to another. Collective.
+  virtual void find_other(Vec /*displacement*/, double /*accuracy*/, Outcome& /*outcome*/) {}
   /// Returns the multipliers of contact with which the next search begins.
   virtual ContactPressures pressures() const { return {}; }
   /// Sets the multipliers of contact, as where a step is rejected; empty ones are 0. Collective.
