@@ -125,9 +125,7 @@ void OtherRestSearch::consider(Vec displacement, const ContactPressures& here, d
 /// the gaps that are left. Collective; `side` is null on ranks that do not own the point.
 OtherRestSearch::End OtherRestSearch::change_side(const OtherSide* side, Vec displacement,
                                                   double accuracy) {
-  // Of the work of the contact's force over the gap: after the program, which is not exact, and
-  // after a further step.
-  constexpr double promising = 0.4, still_promising = 0.1;
+  constexpr double promising = 0.4;  // of the work of the contact's force over the gap
   check(VecCopy(displacement, start_));
   const double value_here = programs_.evaluate(start_);
   const double energy_here = programs_.without_contact(value_here);
@@ -144,10 +142,7 @@ OtherRestSearch::End OtherRestSearch::change_side(const OtherSide* side, Vec dis
   if (programs_.evaluate_tissue(start_) > energy_here + promising * work) return End::failed;
   int64_t iterations = 0;
   End end = programs_.run(start_, accuracy, iterations, 1);
-  const double value = programs_.evaluate(start_);
-  const double most = energy_here + still_promising * work;
-  if (end == End::failed &&
-      (is_less(value, value_here) || programs_.without_contact(value) <= most))
+  if (end == End::failed && is_less(programs_.evaluate(start_), value_here))
     end = programs_.run(start_, accuracy, iterations);
   const bool less = is_less(programs_.evaluate(start_), value_here);
   return end == End::reached && !less ? End::failed : end;

@@ -468,8 +468,20 @@ BREAKS = [
     ),
     (
         "rest positions are searched for from the prediction alone",
-        "  consider(Start::slack, displacement, accuracy, outcome);\n",
-        "",
+        "for (const bool slack : {false, true})",
+        "for (const bool slack : {false})",
+        r"^program\.contact$",
+    ),
+    (
+        "all curvature of gaps goes at once",
+        "shares = {1.0, 0.7, 0.35, 0.0};",
+        "shares = {1.0, 0.0};",
+        r"^program\.contact$",
+    ),
+    (
+        "a point goes to another side in one search alone",
+        "if (end == End::failed && is_less(programs_.evaluate(start_), value_here))",
+        "if (false)",
         r"^program\.contact$",
     ),
 ]
