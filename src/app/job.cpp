@@ -105,7 +105,7 @@ void build(MPI_Comm comm, const std::filesystem::path& input, const scene::Scene
   base::collective_try(comm, [&] {
     scene = base::rank(comm) == 0 ? job.anatomy->scene : scene::read_scene(input, changes);
   });
-  if (scene.tissue.material) job.regions = scene.tissue.material->regions;
+  job.material = scene.tissue.material;
   const model::ColumnGeometry* columns = geometry ? &*geometry : nullptr;
   const bool opens = opens_incisions(comm, job);
   if (geometry) geometry->include_incisions(!opens);

@@ -26,36 +26,31 @@ std::vector<solve::PlanPiece> find_pieces(const Job& job) {
   return pieces;
 }
 
-/// On rank 0.
-std::vector<solve::Stratum> find_strata(const Job& job) {
-  if (!job.local_model.part.solid || !job.anatomy || job.reference_state) return {};
-  const scene::Tissue& tissue = job.anatomy->scene.tissue;
-  if (!tissue.material || tissue.material->dilatation == scene::Dilatation::nodal) return {};
+/// From the skin down.
+std::vector<solve::Stratum> strata_of(const scene::Material& material) {
   std::vector<solve::Stratum> strata;
   const auto add = [&](double thickness, const scene::Elasticity& elasticity) {
     const model::Moduli moduli = model::moduli(elasticity);
     strata.push_back({thickness, moduli.shear, moduli.volume});
   };
-  for (const scene::Stratum& stratum : tissue.material->strata)
-    add(stratum.thickness, stratum.elasticity);
-  add(0, tissue.material->deep);
+  for (const scene::Stratum& stratum : material.strata) add(stratum.thickness, stratum.elasticity);
+  add(0, material.deep);
   return strata;
 }
 
 }  // namespace
 
-std::vector<solve::PlanPiece> plan_pieces(MPI_Comm comm, const Job& job) {
-  std::vector<solve::PlanPiece> pieces;
-  base::on_root(comm, [&] { pieces = find_pieces(job); });
-  base::broadcast(comm, pieces);
-  return pieces;
-}
-
-std::vector<solve::Stratum> plan_strata(MPI_Comm comm, const Job& job) {
-  std::vector<solve::Stratum> strata;
-  if (base::rank(comm) == 0) strata = find_strata(job);
-  base::broadcast(comm, strata);
-  return strata;
+solve::Derivatives plan_derivatives(MPI_Comm comm, const Job& job) {
+  solve::Derivatives by;
+  base::on_root(comm, [&] { by.pieces = find_pieces(job); });
+  base::broadcast(comm, by.pieces);
+  if (!job.material || job.reference_state || job.material->dilatation == scene::Dilatation::nodal)
+    return by;
+  const model::Model& model = job.local_model.part.model;
+  by.strata = strata_of(*job.material);
+  by.in_region = model::in_regions(job.material->regions, model);
+  by.support_shares = model::support_shares(*job.material, model);
+  return by;
 }
 
 std::string describe_tangents(const std::vector<model::PointField>& fields) {

@@ -81,9 +81,7 @@ struct PlanSession::State {
   MPI_Comm comm;
   Job job;
   std::vector<Piece> pieces;
-  std::vector<solve::PlanPiece> plan;
-  std::vector<solve::Stratum> strata;
-  std::vector<char> in_region;  // as in solve::Derivatives
+  solve::Derivatives derivatives;  // its pieces at the latest plan
   scene::Plan box;
   solve::Settings settings;
   std::list<Base> bases;  // the latest first
@@ -110,6 +108,7 @@ void PlanSession::State::require_inside(const Placements& placements) const {
 }
 
 void PlanSession::State::take(const Placements& placements) {
+  std::vector<solve::PlanPiece>& plan = derivatives.pieces;
   for (size_t k = 0; k < plan.size(); ++k) plan[k].placement = placements[k];
   set_motions(plan, part().model);
   if (base::rank(comm) == 0) set_motions(plan, job.local_model.global_metadata);
@@ -157,7 +156,7 @@ Base* PlanSession::State::base(const Placements& placements,
   require_inside(placements);
   take(placements);
   solve::Settings with = settings;
-  with.derivatives.pieces = plan;
+  with.derivatives.pieces = derivatives.pieces;
   with.abandoned = abandoned;
   Solved solved = search(placements, with, {});
   const solve::PathOutcome& path = solved.summary.path;
@@ -214,10 +213,8 @@ PlanSession::PlanSession(MPI_Comm comm, const std::filesystem::path& input,
   s.settings = settings_of(s.job.requested, s.job.local_model.part.solid);
   s.settings.initial_equilibrium = s.job.initial_equilibrium;
   s.settings.finds_other_rest = false;
-  s.plan = plan_pieces(comm, s.job);
-  s.strata = plan_strata(comm, s.job);
-  s.in_region = model::in_regions(s.job.regions, s.job.local_model.part.model);
-  for (const solve::PlanPiece& piece : s.plan) {
+  s.derivatives = plan_derivatives(comm, s.job);
+  for (const solve::PlanPiece& piece : s.derivatives.pieces) {
     std::string name =
         base::rank(comm) == 0 ? s.job.local_model.global_metadata.bones[piece.bone] : "";
     base::broadcast(comm, name);
@@ -269,8 +266,9 @@ PlanSession::Answer PlanSession::solve(const Request& request) {
   with.path.accuracy = request.accuracy;
   with.finds_other_rest = request.other_rest;
   with.abandoned = request.abandoned;
-  with.derivatives = {s.plan, s.strata, request.tangents, s.weights(request.functional),
-                      s.in_region};
+  with.derivatives = s.derivatives;
+  with.derivatives.fields = request.tangents;
+  with.derivatives.functional = s.weights(request.functional);
   Solved solved = s.search(request.plan, with, start);
   answer.summary = solved.summary;
   if (answer.summary.path.last.stopped) return answer;  // an abandoned plan is no answer

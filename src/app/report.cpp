@@ -69,7 +69,7 @@ std::string remedy(const solve::Summary& s, bool stretched) {
            "or lower tissue.turgor: what the skin's tension presses together beneath it may have "
            "no balance, or none any more where it is cut.";
   if (s.path.last.stopped) return "";
-  if (s.pierced_by_instrument.columns > 0)
+  if (s.path.last.pierced > 0)
     return " The instrument is inside tissue or bone, because only points of the skin touch it: "
            "push it less far, use a finer skin (tissue.edge), keep instruments apart or, where the "
            "skin slides on it, let it stick (skin: stick).";
@@ -163,11 +163,13 @@ std::string describe_pierced(const std::vector<std::string>& bodies, const solve
         s.pierced.columns, noun(s.pierced.columns), s.pierced.depth, bodies[s.pierced.body],
         s.pierced.where);
   const solve::PiercedColumns& by = s.pierced_by_instrument;
-  if (by.columns > 0)
+  if (by.columns + by.prisms > 0)
     text += report_row("pierced by instrument",
-                       "{} {}, up to {:.1f} mm deep, the deepest by {} at {:.1f} mm; push it "
+                       "{}, up to {:.2g} mm deep, the deepest by {} at {:.1f} mm; push it "
                        "less far, use a finer skin (tissue.edge) or, where it slides, skin: stick",
-                       by.columns, noun(by.columns), by.depth, bodies[by.body], by.where);
+                       by.columns > 0 ? fmt::format("{} {}", by.columns, noun(by.columns))
+                                      : fmt::format("{} prisms between columns", by.prisms),
+                       by.depth, bodies[by.body], by.where);
   return text;
 }
 

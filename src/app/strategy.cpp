@@ -177,9 +177,7 @@ void choose_tangents(MPI_Comm comm, const base::Options& options, const Job& job
   refuse_unless(!is_force(s), "the functional is force");
   refuse_unless(!s.tears, "the tissue may tear");
   refuse_unless(s.coarse != Coarse::instead, "a coarser model takes the place of the scene's own");
-  s.tangents.pieces = plan_pieces(comm, job);
-  s.tangents.strata = plan_strata(comm, job);
-  s.tangents.in_region = model::in_regions(job.regions, job.local_model.part.model);
+  s.tangents = plan_derivatives(comm, job);
   refuse_unless(!s.tangents.pieces.empty(), "no bone moves, and the scene has no plan.pieces");
 }
 

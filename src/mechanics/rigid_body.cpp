@@ -2,6 +2,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -81,6 +82,38 @@ RigidBody RigidBody::rounded(double times) const {
   RigidBody body = *this;
   if (field) body.shape_ = std::make_shared<const Shape>(field->rounded(times));
   return body;
+}
+
+namespace {
+
+double deepest_in(const scene::Sphere& ball, double at_most) {
+  return std::min(ball.radius, at_most);
+}
+double deepest_in(const scene::Capsule& capsule, double at_most) {
+  return std::min(capsule.radius, at_most);
+}
+double deepest_in(const scene::Box& box, double at_most) {
+  return std::min(box.size.minCoeff() / 2, at_most);
+}
+double deepest_in(const scene::HalfSpace&, double at_most) { return at_most; }
+double deepest_in(const surface::DistanceField& field, double at_most) {
+  constexpr int steps = 8;
+  double deepest = 0;
+  const surface::Surface& mesh = field.surface();
+  for (const auto& t : mesh.triangles) {
+    const std::array<Vec3, 3> x = base::pick(mesh.points, t);
+    const Vec3 normal = (x[1] - x[0]).cross(x[2] - x[0]).normalized();
+    for (int k = -steps; k <= steps && deepest < at_most; ++k)
+      deepest = std::max(
+          deepest, -field.value((x[0] + x[1] + x[2]) / 3 + k * (1.2 * at_most / steps) * normal));
+  }
+  return std::min(deepest, at_most);
+}
+
+}  // namespace
+
+double RigidBody::deepest(double at_most) const {
+  return std::visit([&](const auto& shape) { return deepest_in(shape, at_most); }, *shape_);
 }
 
 double RigidBody::reach() const {

@@ -241,7 +241,7 @@ Model build_local(const scene::Scene& scene, const std::vector<surface::Surface>
   }
   add_contact(scene, mesh, piece.ends, model);
   if (!piece.jaws.empty()) add_adhesion(*scene.anatomy, bones, piece, model);
-  if (solid) add_supports(piece.ends, scene.tissue.material->deep.young, mesh, model);
+  if (solid) add_supports(piece.ends, *scene.tissue.material, mesh, model);
   for (int64_t& column : model.points.column) column = piece.column[column];
   return model;
 }

@@ -4,7 +4,6 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <numeric>
 #include <unordered_map>
 
@@ -42,23 +41,6 @@ Vec3 middle_of(const std::array<Vec3, 6>& corners) {
   return std::accumulate(corners.begin(), corners.end(), Vec3(Vec3::Zero())) / 6;
 }
 
-/// Where a prism is: its middle, and that of the skin's triangle above it.
-struct Place {
-  Vec3 middle, skin;
-};
-
-using Inside = std::function<bool(const Place&)>;
-
-/// A prism lies in a region of space where its middle does, and in a painted one below its paint.
-Inside inside_of(const scene::SkinRegion& region) {
-  if (const auto* space = std::get_if<scene::Region>(&region))
-    return [contains = contains_of(*space)](const Place& at) { return contains(at.middle); };
-  const auto& painted = std::get<scene::PaintedRegion>(region);
-  return [above = contains_of_skin(region), depth = painted.depth](const Place& at) {
-    return above(at.skin) && (at.middle - at.skin).norm() <= depth;
-  };
-}
-
 /// The means of the strata between two depths.
 Moduli mean_moduli(const scene::Material& material, const std::array<double, 2>& depth) {
   std::vector<double> thickness;
@@ -79,20 +61,17 @@ void set_moduli(const Moduli& here, size_t prism, Prisms& prisms) {
   prisms.modulus[prism] = here.volume;
 }
 
-/// `skin` [points] is the row of the point at the top of the column.
-Place place_of(const Model& model, size_t m, const std::vector<int64_t>& skin) {
-  Vec3 top = Vec3::Zero();
-  for (int c = 0; c < 3; ++c) top += model.points.position[skin[model.prisms.points[m][c]]] / 3;
-  return {middle_of(corners_of(model, m)), top};
-}
-
-/// Calls visit(prism) for each prism that a region holds.
+/// Calls visit(prism) for each prism whose middle a region holds; `skin` [points] is the row of the
+/// point at the top of the column.
 template <class Visit>
 void for_each_prism_in(const scene::MaterialRegion& region, const Model& model,
                        const std::vector<int64_t>& skin, const Visit& visit) {
-  const Inside inside = inside_of(region.where);
-  for (size_t m = 0; m < model.prisms.points.size(); ++m)
-    if (inside(place_of(model, m, skin))) visit(m);
+  const ContainsTissue inside = contains_tissue(region.where);
+  for (size_t m = 0; m < model.prisms.points.size(); ++m) {
+    Vec3 top = Vec3::Zero();
+    for (int c = 0; c < 3; ++c) top += model.points.position[skin[model.prisms.points[m][c]]] / 3;
+    if (inside(middle_of(corners_of(model, m)), top)) visit(m);
+  }
 }
 
 /// [regions] how many prisms each holds.

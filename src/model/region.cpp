@@ -158,6 +158,17 @@ Contains contains_of_skin(const scene::SkinRegion& region) {
   return painted(std::get<scene::PaintedRegion>(region));
 }
 
+ContainsTissue contains_tissue(const scene::SkinRegion& region) {
+  if (const auto* space = std::get_if<scene::Region>(&region))
+    return [contains = contains_of(*space)](const Vec3& place, const Vec3&) {
+      return contains(place);
+    };
+  return [above = contains_of_skin(region), depth = std::get<scene::PaintedRegion>(region).depth](
+             const Vec3& place, const Vec3& skin) {
+    return above(skin) && (place - skin).norm() <= depth;
+  };
+}
+
 void check_painted_meshes(const scene::Tissue& tissue, const surface::Surface& skin) {
   std::vector<scene::SkinRegion> regions = tissue.face;
   if (tissue.material)

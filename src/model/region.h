@@ -17,6 +17,13 @@ Contains contains_of(const scene::Region& region, double near = 0);
 /// vertex nearest to it, within 10 mm, is painted.
 Contains contains_of_skin(const scene::SkinRegion& region);
 
+/// Whether tissue at a place, of a column with its top at a point of the skin, lies in a region.
+using ContainsTissue = std::function<bool(const Vec3& place, const Vec3& skin)>;
+
+/// Returns a test of whether tissue lies in a region: in space where its place does, and in a
+/// painted one below its paint, to its depth. Reads the region's file as above.
+ContainsTissue contains_tissue(const scene::SkinRegion& region);
+
 /// Refuses painted meshes of which more than 5 % of the vertices lie more than 10 mm from the skin
 /// that the scene names.
 void check_painted_meshes(const scene::Tissue& tissue, const surface::Surface& skin);

@@ -237,13 +237,15 @@ void LoadPath::explain_failure() {
 void LoadPath::refuse_end() {
   Outcome& last = result_.last;
   if (result_.load < 1 || !last.converged) return;
-  last.pierced = find_columns_in_instruments(objective_).columns;
+  const PiercedColumns by = find_columns_in_instruments(objective_);
+  last.pierced = by.columns + by.prisms;
   if (last.overlapped == 0 && last.pierced == 0) return;
   last.converged = false;
   last.reason =
       last.overlapped > 0
           ? fmt::format("points of tissue between bodies that overlap: {}", last.overlapped)
-          : fmt::format("columns of tissue pierced by an instrument: {}", last.pierced);
+      : by.columns > 0 ? fmt::format("columns of tissue pierced by an instrument: {}", by.columns)
+                       : fmt::format("prisms of tissue pierced by an instrument: {}", by.prisms);
 }
 
 PathOutcome LoadPath::run(Vec displacement, Vec guess, const OnStep& on_step) {

@@ -4,6 +4,7 @@
 #include <limits>
 #include <utility>
 
+#include "pierced_columns.h"
 #include "repose/base/agreement.h"
 #include "repose/base/collective.h"
 
@@ -82,6 +83,13 @@ std::vector<Vec3> OtherRestSearch::displacements(Vec state) {
   return found;
 }
 
+/// Returns how much tissue instruments are in, at a state. Collective.
+int64_t OtherRestSearch::pierced(Vec state) {
+  objective_.positions().update(state);
+  const PiercedColumns by = find_columns_in_instruments(objective_);
+  return by.columns + by.prisms;
+}
+
 /// Settles without points that are released from a body: these have less energy than the rest
 /// position that it is to be compared with. Collective.
 Outcome OtherRestSearch::settle(Vec displacement, double accuracy) {
@@ -112,11 +120,13 @@ void OtherRestSearch::consider(Vec displacement, const ContactPressures& here, d
     there = descent_.finish_reached(start_, accuracy, iterations);
   if (is_other && less && end == End::failed) there = settle(start_, accuracy);
   there.iterations += iterations;
-  if (there.converged && is_less(there.objective, outcome.objective)) {
+  if (there.converged && is_less(there.objective, outcome.objective) &&
+      pierced(start_) <= pierced(displacement)) {
     take_other(displacement, accuracy, std::move(there), outcome);
     return;
   }
-  if (is_other && !less && end == End::reached) keep_farther(std::move(other), outcome);
+  if (is_other && !less && end == End::reached && pierced(start_) == 0)
+    keep_farther(std::move(other), outcome);
   penalty_.set_multipliers(here);
 }
 
@@ -173,7 +183,7 @@ bool OtherRestSearch::change_sides(Vec displacement, double accuracy, std::set<s
     int64_t iterations = 0;
     if (end == End::reached) there = descent_.finish_reached(start_, accuracy, iterations);
     there.iterations += iterations;
-    if (there.converged) {
+    if (there.converged && pierced(start_) <= pierced(displacement)) {
       take_other(displacement, accuracy, there, outcome);
       changed = true;
     } else {

@@ -28,6 +28,7 @@ class OtherRestSearch {
  private:
   using End = ContactPrograms::End;
   std::vector<int32_t> pressed_near_edges(Vec displacement);
+  int64_t pierced(Vec state);
   Outcome settle(Vec displacement, double accuracy);
   void consider(Vec displacement, const ContactPressures& here, double accuracy, Outcome& outcome);
   End change_side(const OtherSide* side, Vec displacement, double accuracy);

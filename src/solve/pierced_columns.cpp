@@ -1,6 +1,7 @@
 #include "pierced_columns.h"
 
 #include <algorithm>
+#include <cmath>
 #include <span>
 #include <vector>
 
@@ -8,8 +9,6 @@
 
 namespace repose::solve {
 namespace {
-
-constexpr int samples = 9;
 
 /// A sampled place inside a body.
 struct Sample {
@@ -28,14 +27,29 @@ struct Sampling {
   double min_depth;  // mm, from which samples count
   bool at_points;    // not only between them
 };
-constexpr Sampling in_bones{true, 1.2, false}, in_instruments{false, 0.5, true};
+constexpr Sampling in_bones{true, 1.2, false};
+
+/// The depth of an instrument, mm, at most that of one larger than prisms.
+double depth_of(const mechanics::RigidBody& body) {
+  constexpr double thin = 1, thick = 10, least = 0.05;
+  const double depth = body.deepest(thin);
+  return std::max(least, depth < thin ? depth : body.deepest(thick));
+}
+
+/// Tissue is in an instrument where it is 0.5 mm deep in it, or half of the instrument's depth.
+Sampling in_instrument(double depth) {
+  constexpr double entered = 0.5;  // mm
+  return {false, std::min(entered, depth / 2), true};
+}
 
 /// The deepest sample of a segment; none if all are above the least depth.
 Sample deepest_between(const Vec3& from, const Vec3& to, const Sampling& rule,
                        const mechanics::RigidBody& body) {
   Sample deepest{rule.min_depth, Vec3::Zero()};
+  constexpr double fewest = 9, most = 99;
   const double half = (to - from).norm() / 2, enough = half - rule.min_depth;
   if (body.lower_bound(body.beside((from + to) / 2), enough) >= enough) return {};
+  const int samples = static_cast<int>(std::clamp(2 * half / rule.min_depth, fewest, most));
   for (int k = rule.at_points ? 0 : 1; k <= samples + (rule.at_points ? 1 : 0); ++k) {
     const Vec3 x = from + (to - from) * (static_cast<double>(k) / (samples + 1));
     const Vec3 beside = body.beside(x);
@@ -92,32 +106,95 @@ std::vector<Rows> free_columns(const discrete::Part& part) {
 /// Sums the columns, and takes the deepest place of any rank.
 void combine(MPI_Comm comm, PiercedColumns& found) {
   found.columns = base::sum_over_ranks(comm, found.columns);
+  found.prisms = base::sum_over_ranks(comm, found.prisms);
   found.depth = base::max_over_ranks_with(comm, found.depth, found.body, found.where);
+}
+
+/// Takes a sample in a body as the deepest where it is.
+void take(const Sample& sample, size_t body, PiercedColumns& found) {
+  if (sample.depth <= found.depth) return;
+  found.body = static_cast<int32_t>(body);
+  found.depth = sample.depth;
+  found.where = sample.where;
 }
 
 /// Finds the columns that bones or instruments are in, and were not initially.
 PiercedColumns find_columns(discrete::Objective& objective, const std::vector<Rows>& columns,
-                            const Sampling& rule) {
+                            bool bones) {
   const discrete::Positions& positions = objective.positions();
   const discrete::Part& part = positions.part();
   const std::vector<mechanics::RigidBody>& moved = objective.contact().bodies().bodies();
   const std::vector<Vec3>& before = part.model.points.position;
   PiercedColumns found;
-  for (const Rows& column : columns) {
-    bool pierced = false;
-    for (size_t k = 0; k < moved.size(); ++k) {
-      if ((moved[k].bone() >= 0) != rule.bones) continue;
-      const Sample sample = deepest_along(positions.local(), column, rule, moved[k]);
-      if (sample.depth == 0 || deepest_along(before, column, rule, part.bodies[k]).depth > 0)
+  std::vector<char> pierced(columns.size(), 0);
+  for (size_t k = 0; k < moved.size(); ++k) {
+    if ((moved[k].bone() >= 0) != bones) continue;
+    const Sampling rule = bones ? in_bones : in_instrument(depth_of(moved[k]));
+    for (size_t c = 0; c < columns.size(); ++c) {
+      const Sample sample = deepest_along(positions.local(), columns[c], rule, moved[k]);
+      if (sample.depth == 0 || deepest_along(before, columns[c], rule, part.bodies[k]).depth > 0)
         continue;
-      pierced = true;
-      if (sample.depth > found.depth)
-        found = {found.columns, static_cast<int32_t>(k), sample.depth, sample.where};
+      pierced[c] = 1;
+      take(sample, k, found);
     }
-    found.columns += pierced;
   }
-  combine(positions.comm(), found);
+  found.columns = std::ranges::count(pierced, char{1});
   return found;
+}
+
+/// The deepest sample in a body of lines through a prism, about `apart` mm from one another, from
+/// its upper to its lower triangle. Of a prism at the skin they begin a quarter of its longest edge
+/// below: so far the plane triangle may cut through a ball that its corners touch.
+Sample deepest_in_prism(const std::array<Vec3, 6>& x, bool at_skin, double apart,
+                        const Sampling& rule, const mechanics::RigidBody& body) {
+  constexpr int finest = 16;
+  constexpr double cut_share = 0.25;
+  const double longest =
+      std::max({(x[1] - x[0]).norm(), (x[2] - x[1]).norm(), (x[0] - x[2]).norm()});
+  const double reach = longest + (x[3] - x[0]).norm();
+  if (body.lower_bound(body.beside((x[0] + x[5]) / 2), reach) >= reach) return {};
+  const int parts = std::clamp(static_cast<int>(std::ceil(longest / apart)), 2, finest);
+  Sample deepest;
+  for (int i = 0; i <= parts; ++i)
+    for (int j = 0; i + j <= parts; ++j) {
+      const double a = static_cast<double>(i) / parts, b = static_cast<double>(j) / parts;
+      const Vec3 bottom = x[3] + a * (x[4] - x[3]) + b * (x[5] - x[3]);
+      Vec3 top = x[0] + a * (x[1] - x[0]) + b * (x[2] - x[0]);
+      if (at_skin)
+        top += std::min(1.0, cut_share * longest / (bottom - top).norm()) * (bottom - top);
+      const Sample sample = deepest_between(top, bottom, rule, body);
+      if (sample.depth > deepest.depth) deepest = sample;
+    }
+  return deepest;
+}
+
+/// Adds the prisms that instruments smaller than these have entered.
+void add_prisms(discrete::Objective& objective, PiercedColumns& found) {
+  const discrete::Positions& positions = objective.positions();
+  const discrete::Part& part = positions.part();
+  const model::Points& points = part.model.points;
+  const std::vector<mechanics::RigidBody>& moved = objective.contact().bodies().bodies();
+  for (size_t k = 0; k < moved.size(); ++k) {
+    if (moved[k].bone() >= 0) continue;
+    const double depth = depth_of(moved[k]);
+    const Sampling rule = in_instrument(depth);
+    for (int64_t m = 0; m < part.owned_prisms; ++m) {
+      const auto& corners = part.model.prisms.points[m];
+      const std::array<Vec3, 6> now = base::pick(positions.local(), corners);
+      const bool free = std::ranges::any_of(
+          corners, [&](int64_t p) { return points.set[p] == model::PointSet::soft_tissue; });
+      if (!free || depth >= (now[1] - now[0]).norm()) continue;
+      const bool at_skin = points.layer[corners[0]] == 0;
+      const auto in = [&](const std::array<Vec3, 6>& x, const mechanics::RigidBody& body) {
+        return deepest_in_prism(x, at_skin, depth, rule, body);
+      };
+      const Sample sample = in(now, moved[k]);
+      if (sample.depth == 0 || in(base::pick(points.position, corners), part.bodies[k]).depth > 0)
+        continue;
+      ++found.prisms;
+      take(sample, k, found);
+    }
+  }
 }
 
 }  // namespace
@@ -125,14 +202,20 @@ PiercedColumns find_columns(discrete::Objective& objective, const std::vector<Ro
 PiercedColumns find_pierced_columns(discrete::Objective& objective) {
   const discrete::Positions& positions = objective.positions();
   if (!positions.part().contact) return {};
-  return find_columns(objective, deepest_segments(positions.comm(), positions.part()), in_bones);
+  PiercedColumns found =
+      find_columns(objective, deepest_segments(positions.comm(), positions.part()), true);
+  combine(positions.comm(), found);
+  return found;
 }
 
 PiercedColumns find_columns_in_instruments(discrete::Objective& objective) {
   const discrete::Part& part = objective.positions().part();
   if (!part.contact) return {};
   objective.contact().place_bodies();
-  return find_columns(objective, free_columns(part), in_instruments);
+  PiercedColumns found = find_columns(objective, free_columns(part), false);
+  add_prisms(objective, found);
+  combine(objective.positions().comm(), found);
+  return found;
 }
 
 }  // namespace repose::solve

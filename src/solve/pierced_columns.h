@@ -9,10 +9,11 @@ namespace repose::solve {
 /// initially. Needs the model's contact with bones; without it nothing is found. Collective.
 PiercedColumns find_pierced_columns(discrete::Objective& objective);
 
-/// Finds columns with free points that are inside an instrument at a point, or at one of nine
-/// samples between two consecutive points: deeper than 0.5 mm at the objective's last update, where
-/// no sample of the column was so initially. Needs the model's contact with instruments; without it
-/// nothing is found. Collective.
+/// Finds columns with free points that are inside an instrument at a point, or at one of at least
+/// nine samples between two consecutive points: deeper than 0.5 mm, or half of the instrument's
+/// depth, at the objective's last update, where no sample of the column was so initially. Finds
+/// prisms, too, between whose columns a smaller instrument is. Needs the model's contact with
+/// instruments; without it nothing is found. Collective.
 PiercedColumns find_columns_in_instruments(discrete::Objective& objective);
 
 }  // namespace repose::solve

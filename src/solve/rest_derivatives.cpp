@@ -72,7 +72,10 @@ class StrataForces {
  public:
   /// At the positions' last update.
   StrataForces(const discrete::Objective& objective, const Derivatives& requested)
-      : objective_(objective), strata_(requested.strata), in_region_(requested.in_region) {
+      : objective_(objective),
+        strata_(requested.strata),
+        in_region_(requested.in_region),
+        support_shares_(requested.support_shares) {
     if (strata_.empty()) return;
     const model::Model& model = positions().part().model;
     std::vector<double> thickness;
@@ -88,20 +91,24 @@ class StrataForces {
     std::vector<Vec3> force(positions().local().size(), Vec3::Zero());
     for (size_t m = 0; m < share_.size(); ++m)
       if (share_[m][stratum] > 0 && is_of_strata(m)) add(m, share_[m][stratum], stratum, force);
-    if (stratum + 1 == strata_.size()) add_supports(force);
+    add_supports(stratum, force);
     positions().restrict_to_owned(force, slope);
   }
 
  private:
   const discrete::Positions& positions() const { return objective_.positions(); }
 
-  /// Elastic supports are as stiff as the deepest stratum.
-  void add_supports(std::vector<Vec3>& force) const {
-    const auto& elements = positions().part().model.elements;
-    for (size_t k = 0; k < elements.size(); ++k)
-      if (elements[k].term == "elastic_support")
-        objective_.loops().terms[k].add_gradient(positions().local(), positions().poses(), 1,
-                                                 force);
+  /// Adds the forces of elastic supports by their share of the stratum.
+  void add_supports(size_t stratum, std::vector<Vec3>& force) const {
+    const discrete::Part& part = positions().part();
+    for (model::TermElements supports : part.model.elements) {
+      if (supports.term != "elastic_support") continue;
+      for (size_t e = 0; e < supports.size(); ++e)
+        supports.numbers[e * static_cast<size_t>(supports.numbers_each) + 3] *=
+            support_shares_[e][stratum];
+      const mechanics::TermLoop loop(supports, part.model.points, part.owned_points);
+      loop.add_gradient(positions().local(), positions().poses(), 1, force);
+    }
   }
 
   /// False for a prism of a region, which has moduli of its own.
@@ -127,6 +134,7 @@ class StrataForces {
   const discrete::Objective& objective_;
   const std::vector<Stratum>& strata_;
   const std::vector<char>& in_region_;
+  const std::vector<std::vector<double>>& support_shares_;
   std::vector<std::vector<double>> share_;  // [prisms][strata]
 };
 

@@ -244,3 +244,16 @@ def test_another_rest_position_at_an_edge_names_the_instrument(slab, ranks):
     result, _ = slab(plate, 0.05, 0, "-accuracy", 0.001, ranks=ranks)
     assert re.search(r"other rest position .* on either side of an edge of instruments\[0\], and",
                      result.stdout), result
+
+
+def test_an_instrument_thinner_than_a_layer_does_not_pass_the_skin_unseen(slab, tmp_path):
+    """A plate inside the tissue, where the search for another rest position leads, stores no energy."""
+    plate = "{box: {center: [0, 0, 16], size: [14, 14, 0.9]}, push: [0, 0, -2], skin: slide}"
+    _, step = slab(plate, 0.05, 0)
+    model = model_of(tmp_path / "slab.h5")
+    below = (model["point/layer"] == 0) & (np.abs(model["point/position"][:, :2]).max(1) < 5)
+    assert step["point/displacement"][below][:, 2] == pytest.approx(-1.45, abs=0.02)
+    rod = "capsule: {from: [-8, 0.2, 16], to: [8, 0.2, 16], radius: 0.4}, push: [0, 0, -4], skin: slide"
+    result, _ = slab(f"{{{rod}}}", 0.05, 0, status=2)
+    assert re.search(r"pierced by instrument +\d+ (columns|prisms between columns), up to 0\.\d+ mm deep",
+                     result.stdout)

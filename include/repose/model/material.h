@@ -32,6 +32,12 @@ std::vector<int64_t> skin_rows(const Points& points);
 /// [prisms] 1 where a region of a material holds a prism. Reads the regions' meshes and volumes.
 std::vector<char> in_regions(const std::vector<scene::MaterialRegion>& regions, const Model& model);
 
+/// Returns by how much each elastic support of a part of a model stiffens with the stiffness of
+/// each stratum of its material: [elements][strata, the last below all] ∂ ln k/∂ ln E. Reads the
+/// regions' meshes and volumes.
+std::vector<std::vector<double>> support_shares(const scene::Material& material,
+                                                const Model& model);
+
 /// Initial positions of a prism's points, mm.
 std::array<Vec3, 6> corners_of(const Model& model, size_t prism);
 

@@ -47,6 +47,8 @@ struct Derivatives {
   /// [prisms of this rank's part] 1 where a region's material, not that of the strata, is; empty:
   /// nowhere.
   std::vector<char> in_region = {};
+  /// [elastic supports of this rank's part][strata] ∂ ln k/∂ ln E (model::support_shares).
+  std::vector<std::vector<double>> support_shares = {};
 
   bool requested() const {
     return (fields || !functional.empty()) && !(pieces.empty() && strata.empty());
@@ -109,6 +111,7 @@ struct ContactSummary {
 /// Columns of tissue that a body has entered since the start.
 struct PiercedColumns {
   int64_t columns = 0;
+  int64_t prisms = 0;         ///< that a small instrument has entered between their columns
   int32_t body = -1;          ///< of the model's contact: that at the deepest place
   double depth = 0;           ///< mm, there
   Vec3 where = Vec3::Zero();  ///< mm, there, where the run ended

@@ -48,7 +48,7 @@ struct Outcome {
   double gradient_max = 0;  ///< N
   int64_t iterations = 0;
   int64_t overlapped = 0;  ///< points between bodies that overlap, which rest on one of them alone
-  int64_t pierced = 0;     ///< columns of tissue inside an instrument at the end of a path
+  int64_t pierced = 0;     ///< columns and prisms that instruments are in at the end of a path
   std::string reason;
   std::optional<OtherRest> other;
 };

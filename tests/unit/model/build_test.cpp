@@ -291,6 +291,31 @@ TEST(Build, the_support_of_a_solid_by_bone_follows_the_move_without_a_jump) {
   }
 }
 
+TEST(Build, the_support_of_a_solid_is_as_stiff_as_the_materials_above_it) {
+  TwoJaws jaws;  // 10 mm of tissue
+  jaws.scene.moves[1] = RigidMotion::translation({0, 6, 0});
+  const auto stiffness_in = [&](const scene::Material& material) {
+    jaws.scene.tissue.material = material;
+    std::vector<double> found;
+    for (const TermElements& elements :
+         build_model(jaws.scene, jaws.skin, jaws.bones).model.elements)
+      for (size_t e = 0; e < elements.size(); ++e) found.push_back(elements.numbers_of(e)[3]);
+    return found;
+  };
+  const std::vector<double> plain = stiffness_in({{0.02, 0.45}, {}, {}});
+  ASSERT_FALSE(plain.empty());
+  const auto expect_times = [&](double times, const scene::Material& material) {
+    const std::vector<double> found = stiffness_in(material);
+    ASSERT_EQ(found.size(), plain.size());
+    for (size_t e = 0; e < found.size(); ++e)
+      EXPECT_NEAR(found[e], times * plain[e], 1e-12 * plain[e]) << e;
+  };
+  const scene::Stratum skin{4, {0.08, 0.45}}, all{100, {0.02, 0.45}};
+  expect_times(1 / (0.4 / 4 + 0.6), {{0.02, 0.45}, {skin}, {}});
+  expect_times(1, {{7, 0.45}, {all}, {}});
+  expect_times(3, {{7, 0.45}, {}, {{scene::Box{{50, 50, 0}, {1e3, 1e3, 1e3}}, {0.06, 0.45}}}});
+}
+
 TEST(Build, a_rim_lets_go_beside_a_moving_piece_without_a_jump) {
   TwoJaws jaws;
   jaws.scene.tissue.material = scene::Material{{0.015, 0.45}, {}, {}};

@@ -84,6 +84,20 @@ TEST(PiercedByInstrument, ABallBetweenTwoLayersIsFound) {
   EXPECT_NEAR(pierced.depth, 0.9, 0.01);
 }
 
+TEST(PiercedByInstrument, ABallBetweenColumnsIsFound) {
+  const solve::Summary summary = push_ball(0.9, {18.5, 21.5, -4.5}, {60, 0, 0});
+  EXPECT_EQ(summary.pierced_by_instrument.columns, 0);
+  EXPECT_EQ(summary.pierced_by_instrument.prisms, 1);
+  EXPECT_GT(summary.pierced_by_instrument.depth, 0.45);
+  EXPECT_EQ(summary.last.reason, "prisms of tissue pierced by an instrument: 1");
+}
+
+TEST(PiercedByInstrument, TissueUnderASmallBallThatPressesTheSkinIsNot) {
+  const solve::Summary summary = push_ball(2.6, {15, 20, 1.6}, {0, 0, -5});
+  EXPECT_TRUE(summary.path.complete());
+  EXPECT_GT(summary.contacts[0].points, 0);
+}
+
 TEST(PiercedByInstrument, FixedColumnsAndThoseThatBeganInsideAreNot) {
   EXPECT_EQ(push_ball(8, {0, 20, -9}, {60, 0, 0}).pierced_by_instrument.columns, 3);
   const solve::Summary inside = push_ball(8, {15, 20, -9}, {0.5, 0, 0});
