@@ -309,7 +309,8 @@ std::string PlanSession::write(const std::filesystem::path& name) {
     text = describe_answer(s.job, skin, now, summary, -1) + text +
            describe_failure(s.job, summary) + describe_touching(s.job, skin, now, summary) +
            report_row("result", "{}, {}_*.xdmf (ParaView)", result, name.string()) + given;
-    results::add_summary(result, text);
+    const std::string refused = results::add_summary(result, text);
+    if (!refused.empty()) text += report_row("warning", "{}", refused);
   });
   return text;
 }

@@ -296,7 +296,10 @@ base::Exit Run::solve() {
                            report_row("result", "{}.h5, {}_*.xdmf (ParaView)", name_, name_) +
                            given;
   print(text);
-  base::on_root(comm, [&] { results::add_summary(name_ + ".h5", text); });
+  base::on_root(comm, [&] {
+    const std::string refused = results::add_summary(name_ + ".h5", text);
+    if (!refused.empty()) fmt::print(stderr, "warning: {}\n", refused);
+  });
   const bool holds =
       summary.path.complete() && !folded && !coarser.misses_continuum && (!path || path->holds());
   return holds ? base::Exit::done : base::Exit::not_converged;

@@ -1,5 +1,7 @@
 #include "repose/linear/tangent_solver.h"
 
+#include <algorithm>
+
 #include "repose/base/collective.h"
 #include "repose/base/petsc.h"
 
@@ -27,13 +29,15 @@ TangentSolver::TangentSolver(discrete::Positions& positions, discrete::Hessian& 
 }
 
 void TangentSolver::make_krylov() {
+  constexpr double coarsest = 0.9;  // of what solves request
   check(KSPCreate(positions_.comm(), krylov_.out()));
   check(KSPSetType(krylov_, KSPCG));
   check(KSPSetNormType(krylov_, KSP_NORM_NATURAL));
-  check(KSPSetTolerances(krylov_, 1e-3, 0.0, PETSC_DEFAULT, 500));
+  check(KSPSetTolerances(krylov_, coarsest, 0.0, PETSC_DEFAULT, 500));
   preconditioner_.attach(krylov_);
   base::check_options(KSPSetFromOptions(krylov_));
   choose_norm(krylov_);
+  check(KSPGetTolerances(krylov_, &most_left_, nullptr, nullptr, nullptr));
   check(KSPSetOperators(krylov_, hessian_.action(), preconditioner_.matrix()));
 }
 
@@ -83,7 +87,8 @@ void TangentSolver::throw_unsolvable() {
 bool TangentSolver::solve(Vec displacement, Vec rhs, Vec delta, double relative_tolerance) {
   prepare(displacement);
   check(KSPSetOperators(krylov_, hessian_.action(), preconditioner_.matrix()));
-  check(KSPSetTolerances(krylov_, relative_tolerance, 0.0, PETSC_DEFAULT, PETSC_DEFAULT));
+  check(KSPSetTolerances(krylov_, std::min(relative_tolerance, most_left_), 0.0, PETSC_DEFAULT,
+                         PETSC_DEFAULT));
   check(KSPSolve(krylov_, rhs, delta));
   KSPConvergedReason reason = KSP_CONVERGED_ITERATING;
   check(KSPGetConvergedReason(krylov_, &reason));

@@ -72,14 +72,18 @@ bool is_row(const json& value) {
 }
 
 void read_gradient_of(const json& value, Request& request) {
+  constexpr double least = 1e-100, most = 1e100;
   if (!value.is_array() || value.empty())
     refuse_value("gradient_of", "a list of {\"point\": row, \"weight\": [x, y, z]}", value);
   for (const json& one : value) {
     require_known(one, "gradient_of", {"point", "weight"});
     if (!one.contains("point") || !is_row(one["point"]) || !one.contains("weight"))
       refuse_value("gradient_of: point", "a row of the answer's points, from 0", one);
-    request.gradient_of.emplace_back(one["point"].get<int64_t>(),
-                                     read_vector(one, "gradient_of", "weight"));
+    const Vec3 weight = read_vector(one, "gradient_of", "weight");
+    if ((weight.array() != 0 && (weight.array().abs() < least || weight.array().abs() > most))
+            .any())
+      refuse_value("gradient_of: weight", "three numbers, each 0 or of 1e-100 … 1e100", one);
+    request.gradient_of.emplace_back(one["point"].get<int64_t>(), weight);
   }
 }
 

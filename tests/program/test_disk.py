@@ -37,23 +37,42 @@ def refused_and_intact(result, older):
     return lines[0]
 
 
-@pytest.mark.skipif(os.geteuid() != 0, reason="needs the right to mount")
-@pytest.mark.parametrize("kilobytes, ranks", [(64, 1), (700, 1), (700, 2)])
-def test_a_full_disk(run, tmp_path, kilobytes, ranks):
+@pytest.fixture
+def small_disk(tmp_path):
+    """small_disk(kilobytes) → the folder of a disk of that size."""
     disk = tmp_path / "disk"
-    disk.mkdir()
-    mounted = subprocess.run(
-        ["mount", "-t", "tmpfs", "-o", f"size={kilobytes}k", "none", disk], capture_output=True
-    )
-    if mounted.returncode != 0:
-        pytest.skip("tmpfs cannot be mounted here")
-    try:
-        (disk / "face.h5").write_text("what was there")
-        before = contents(disk)
-        result = run("repose-solve", SCENE, "-output", disk / "face", ranks=ranks)
-        assert "face" in refused_and_intact(result, (disk, before))
-    finally:
+
+    def mount(kilobytes):
+        disk.mkdir()
+        options = ["-t", "tmpfs", "-o", f"size={kilobytes}k", "none", disk]
+        if os.geteuid() != 0 or subprocess.run(["mount", *options], capture_output=True).returncode:
+            pytest.skip("tmpfs cannot be mounted here")
+        return disk
+
+    yield mount
+    if os.path.ismount(disk):
         subprocess.run(["umount", disk], check=True)
+
+
+@pytest.mark.parametrize("kilobytes, ranks", [(64, 1), (700, 1), (700, 2)])
+def test_a_full_disk(run, small_disk, kilobytes, ranks):
+    disk = small_disk(kilobytes)
+    (disk / "face.h5").write_text("what was there")
+    before = contents(disk)
+    result = run("repose-solve", SCENE, "-output", disk / "face", ranks=ranks)
+    assert "face" in refused_and_intact(result, (disk, before))
+
+
+@pytest.mark.parametrize("room", [1.4, 2.01])
+def test_a_disk_without_room_for_the_summary_has_the_result(run, older, small_disk, room):
+    """The summary is written into a copy of the result."""
+    folder, _ = older
+    disk = small_disk(int(room * (folder / "face.h5").stat().st_size / 1024))
+    result = run("repose-solve", SCENE, "-output", disk / "face")
+    assert result.returncode == 0 and result.stderr.startswith("warning: "), result
+    assert "the result is whole, but without its summary" in result.stderr
+    assert [path.name for path in disk.glob("*.h5*")] == ["face.h5"]
+    assert run("repose-check", disk / "face.h5").returncode == 0
 
 
 def without_rights():

@@ -121,6 +121,8 @@ def test_refusals_name_the_place_and_the_session_goes_on(session):
                     {"do": "solve", "tangents": "yes"}, {"do": "solve", "gradient_of": []},
                     {"do": "solve", "gradient_of": [{"point": -1, "weight": [0, 0, 1]}]},
                     {"do": "solve", "gradient_of": [{"point": 2**64 - 1, "weight": [0, 0, 1]}]},
+                    {"do": "solve", "gradient_of": [{"point": 1, "weight": [0, 1e160, 0]}]},
+                    {"do": "solve", "gradient_of": [{"point": 1, "weight": [0, 0, -1e-300]}]},
                     {"do": "solve", "gradient_of": [{"point": 1}]}):
         with pytest.raises(repose.Refused) as refusal:
             session.ask(request)

@@ -141,3 +141,14 @@ def test_the_preconditioner_alone_takes_conjugate_gradients_for_contact(run, tmp
         whole = re.search(r"tangents +(\d+) of (\d+) derivatives", result.stdout)
         assert whole[1] == whole[2] != "0"
     assert apart(last(tmp_path / "alone.h5"), last(tmp_path / "plain.h5")) <= 0.04
+
+
+def test_linear_systems_are_solved_as_far_as_requested(run):
+    """Beyond what the program requires: a larger tolerance would bound no error."""
+    iterations = []
+    for tolerance in (1, 1e-8):
+        result = run("repose-solve", PROJECT / "meshes/head_springs_genioplasty.yaml", "-ksp_rtol",
+                     tolerance, "-ksp_converged_reason")
+        assert (result.returncode, result.stderr) == (0, ""), result
+        iterations.append(sum(map(int, re.findall(r"due to CONVERGED_RTOL iterations (\d+)", result.stdout))))
+    assert iterations[1] > 3 * iterations[0] > 0

@@ -6,7 +6,8 @@ namespace repose::linear {
 using KspHandle = base::Handle<KSP, KSPDestroy>;
 
 /// Linear solves with a Hessian: conjugate gradients on the exact action, preconditioned from the
-/// convex relative (preconditioner.h). `-ksp_…` options apply. All members collective.
+/// convex relative (preconditioner.h). `-ksp_…` options apply; of `-ksp_rtol` and the tolerance
+/// that a solve requests, the smaller one. All members collective.
 class TangentSolver {
  public:
   TangentSolver(discrete::Positions& positions, discrete::Hessian& hessian);
@@ -49,6 +50,7 @@ class TangentSolver {
   HessianPreconditioner preconditioner_;
   KspHandle krylov_;
   base::VecHandle residual_;
+  PetscReal most_left_ = 1;  // -ksp_rtol
   bool finished_ = false;
 };
 

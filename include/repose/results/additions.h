@@ -18,8 +18,9 @@ struct GivenSkin {
 };
 void add_given_skin(const std::filesystem::path& file, const GivenSkin& skin);
 
-/// Adds the end-of-run summary, a row for each line of the text.
-void add_summary(const std::filesystem::path& file, const std::string& text);
+/// Adds the end-of-run summary, a row for each line of the text. Returns why not, where the disk
+/// refuses, in place of an error: the run has its result.
+std::string add_summary(const std::filesystem::path& file, const std::string& text);
 /// Adds the summary of another result, if that has one.
 void copy_summary(const std::filesystem::path& from, const std::filesystem::path& file);
 
