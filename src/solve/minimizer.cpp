@@ -19,13 +19,18 @@ Minimizer::Minimizer(discrete::Function& function, linear::TangentSolver& solver
     : function_(function),
       solver_(solver),
       watch_(watch),
-      distance_(std::make_unique<RestDistance>(function, estimate)),
-      tao_(std::make_unique<TaoSearch>(function, solver)) {
+      distance_(std::make_unique<RestDistance>(function, estimate)) {
   const bool solid = function.positions().part().solid;
-  const bool finishes = solid && tao_->method() == Method::preconditioned;
-  test_ = std::make_unique<StoppingTest>(function, *distance_, tao_->method(), finishes);
+  search_by(solid ? TAOLMVM : TAONTR);
   progress_ = std::make_unique<ProgressTest>(solid);
   finish_ = std::make_unique<NewtonFinish>(function, *distance_);
+}
+
+void Minimizer::search_by(TaoType type) {
+  tao_ = std::make_unique<TaoSearch>(function_, solver_, type);
+  const bool finishes =
+      function_.positions().part().solid && tao_->method() == Method::preconditioned;
+  test_ = std::make_unique<StoppingTest>(function_, *distance_, tao_->method(), finishes);
 }
 
 Minimizer::~Minimizer() = default;
@@ -74,6 +79,8 @@ Outcome Minimizer::run(Vec displacement, double accuracy) {
   return outcome;
 }
 
+/// Searches and ends by Newton steps. Where limited-memory BFGS stalls, as for nearly
+/// incompressible tissue without its own motion, Newton's method takes its place for good.
 Outcome Minimizer::search_and_finish(Vec displacement, double accuracy) {
   Outcome outcome;
   int64_t iterations = 0;
@@ -87,6 +94,11 @@ Outcome Minimizer::search_and_finish(Vec displacement, double accuracy) {
     if (!test_->left_to_finish() || outcome.converged || outcome.stopped) break;
   }
   outcome.iterations = iterations;
+  const bool stalled = progress_->stalled() && !outcome.converged && !outcome.stopped;
+  if (!stalled || tao_->is_chosen() || tao_->method() != Method::preconditioned) return outcome;
+  search_by(TAONTR);
+  outcome = search_and_finish(displacement, accuracy);
+  outcome.iterations += iterations;
   return outcome;
 }
 

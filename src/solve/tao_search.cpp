@@ -109,12 +109,12 @@ struct TaoSearch::Callbacks {
   }
 };
 
-TaoSearch::TaoSearch(discrete::Function& function, linear::TangentSolver& solver)
+TaoSearch::TaoSearch(discrete::Function& function, linear::TangentSolver& solver, TaoType type)
     : function_(function), solver_(solver), gradient_(function.positions().make_vector()) {
   require_supported_types();
   require_supported_numbers();
   check(TaoCreate(function_.positions().comm(), tao_.out()));
-  check(TaoSetType(tao_, function_.positions().part().solid ? TAOLMVM : TAONTR));
+  check(TaoSetType(tao_, type));
   check(TaoSetObjective(tao_, Callbacks::value, this));
   check(TaoSetObjectiveAndGradient(tao_, nullptr, Callbacks::value_and_gradient, this));
   check(TaoSetHessian(tao_, solver_.hessian().model(), solver_.preconditioner().matrix(),
@@ -124,6 +124,9 @@ TaoSearch::TaoSearch(discrete::Function& function, linear::TangentSolver& solver
   check(TaoSetMaximumFunctionEvaluations(tao_, 100000));
   check(TaoSetConvergenceTest(tao_, Callbacks::converged, this));
   base::check_options(TaoSetFromOptions(tao_));
+  PetscBool chosen = PETSC_FALSE;
+  check(PetscOptionsHasName(nullptr, nullptr, "-tao_type", &chosen));
+  chosen_ = chosen;
   if (has_type(tao_, TAOLMVM) && begins_with_stiffness(function_.positions()))
     initial_ = std::make_unique<InitialHessian>(tao_, solver_);
   if (method() == Method::newton) make_forcing();

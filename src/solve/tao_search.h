@@ -19,12 +19,12 @@ struct TaoIterate {
   StoppingTest::Iterate state;
 };
 
-/// TAO's minimization of a function, by Newton's method or what `-tao_type` chooses, with the
+/// TAO's minimization of a function, by the method given or what `-tao_type` chooses, with the
 /// forcing terms of its linear systems and the renewals of the initial Hessian of limited-memory
 /// BFGS. All members collective.
 class TaoSearch {
  public:
-  TaoSearch(discrete::Function& function, linear::TangentSolver& solver);
+  TaoSearch(discrete::Function& function, linear::TangentSolver& solver, TaoType type);
   TaoSearch(TaoSearch&&) = delete;
 
   /// Returns whether the search ends at an iterate; the same on all ranks.
@@ -34,7 +34,8 @@ class TaoSearch {
   int64_t run(Vec displacement, bool near, Ends ends);
 
   Method method() const;
-  std::string reason() const;  ///< why the latest search ended
+  bool is_chosen() const { return chosen_; }  ///< the method, by `-tao_type`
+  std::string reason() const;                 ///< why the latest search ended
 
  private:
   struct Callbacks;
@@ -46,7 +47,8 @@ class TaoSearch {
   discrete::Function& function_;
   linear::TangentSolver& solver_;
   TaoHandle tao_;
-  std::unique_ptr<InitialHessian> initial_;    // of limited-memory BFGS, where it is requested
+  std::unique_ptr<InitialHessian> initial_;  // of limited-memory BFGS, where it is requested
+  bool chosen_ = false;
   bool sets_forcing_ = false;                  // of Newton's linear systems; else an option does
   double first_force_ = 0, latest_force_ = 0;  // N, largest block of ∇Φ at these iterates
   bool slowed_ = false;                        // the initial Hessian is to be renewed

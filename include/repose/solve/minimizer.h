@@ -1,4 +1,6 @@
 #pragma once
+#include <petsctao.h>
+
 #include <functional>
 #include <memory>
 
@@ -21,13 +23,14 @@ struct ErrorEstimate {
   linear::TangentSolver& solver;
 };
 
-/// Minimizes a function with TAO until the rest position is near enough, in mm. Newton by default;
-/// `-tao_type` chooses any unconstrained TAO method, and all `-tao_…`, `-ksp_…`, `-pc_…` options
-/// apply. `-tao_type lmvm -tao_lmvm_initial stiffness` is limited-memory BFGS that begins with the
-/// stiffness at the start of the search, and again where it has slowed (initial_hessian.h). Its
-/// parts: TAO (tao_search.h), the estimated distance to rest (rest_distance.h), the test that ends
-/// a search (stopping_test.h) and that of its progress (progress_test.h), and Newton steps at its
-/// end (newton_finish.h). All members collective.
+/// Minimizes a function with TAO until the rest position is near enough, in mm. Newton for springs;
+/// limited-memory BFGS for a solid, and Newton where that stalls; `-tao_type` chooses any
+/// unconstrained TAO method, and all `-tao_…`, `-ksp_…`, `-pc_…` options apply. `-tao_type lmvm
+/// -tao_lmvm_initial stiffness` is limited-memory BFGS that begins with the stiffness at the start
+/// of the search, and again where it has slowed (initial_hessian.h). Its parts: TAO (tao_search.h),
+/// the estimated distance to rest (rest_distance.h), the test that ends a search (stopping_test.h)
+/// and that of its progress (progress_test.h), and Newton steps at its end (newton_finish.h). All
+/// members collective.
 class Minimizer : public RestSearch {
  public:
   /// Receives each iteration; returns whether to continue, the same on all ranks.
@@ -56,6 +59,7 @@ class Minimizer : public RestSearch {
   Outcome run(Vec displacement, double accuracy) override;
 
  private:
+  void search_by(TaoType type);
   std::function<bool(const TaoIterate&)> ending(Outcome& outcome);
   Outcome search_and_finish(Vec displacement, double accuracy);
   Outcome summarize(Vec displacement, double accuracy, Outcome outcome, double taken = 0);

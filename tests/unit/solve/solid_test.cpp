@@ -141,6 +141,19 @@ TEST(Solid, TakesFewEvaluations) {
   EXPECT_LE(rest.summary.assemblies, 20);
 }
 
+TEST(Solid, NewtonTakesOverWhereTheSearchStalls) {
+  model::Model m = solid_block(7, 6, 5, 0.4999, 0.3, [](int i, int, int) {
+    return i == 0 ? PointSet::boundary : PointSet::soft_tissue;
+  });
+  for (size_t i = 0; i < m.points.position.size(); ++i)
+    if (m.points.position[i].x() > 29) m.points.external_force[i] = {0.02, 0, 0};
+  const Rest rest = testing::find_rest(m, settings(1e-3));
+  EXPECT_TRUE(rest.summary.path.complete()) << rest.summary.last.reason;
+  const base::ScopedOption chosen("-tao_type", "lmvm");
+  const Rest stalled = testing::find_rest(m, settings(1e-3));
+  EXPECT_FALSE(stalled.summary.path.complete());
+}
+
 TEST(Solid, ReportsWhatItsForcesAre) {
   model::Model m = twisted_block(0.45);
   for (size_t i = 0; i < m.points.mass.size(); ++i) m.points.mass[i] = 1e-6;
