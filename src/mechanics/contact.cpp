@@ -187,6 +187,18 @@ std::optional<Plane> plane_round_edge(const RigidBody& body, const Vec3& beside,
 
 }  // namespace
 
+std::set<int32_t> BodyContact::bodies_near_edges(std::span<const Vec3> position) const {
+  std::set<int32_t> found;
+  for (size_t c = 0; c < pairs_.point.size(); ++c) {
+    const bool touches = multiplier_[c] > 0 || slides(c);
+    if (!touches || normal_[c].isZero(0) || found.contains(pairs_.body[c])) continue;
+    const RigidBody& body = bodies_[pairs_.body[c]];
+    const Vec3 beside = body.beside(position[pairs_.point[c]]);
+    if (plane_round_edge(body, beside, normal_[c], pairs_.offset[c])) found.insert(pairs_.body[c]);
+  }
+  return found;
+}
+
 std::vector<LinearGap> BodyContact::other_sides(std::span<const Vec3> position) const {
   std::vector<LinearGap> found;
   for (size_t c = 0; c < pairs_.point.size(); ++c) {

@@ -38,15 +38,13 @@ void OtherRestSearch::begin(Vec prediction) {
   check(VecCopy(prediction, prediction_));
 }
 
-/// Returns the bodies on which points press near edges, ascending. Collective.
-std::vector<int32_t> OtherRestSearch::pressed_near_edges(Vec displacement) {
+/// Returns the bodies on which points press or slide near edges, ascending. Collective.
+std::vector<int32_t> OtherRestSearch::touched_near_edges(Vec displacement) {
   discrete::Positions& positions = objective_.positions();
   positions.update(displacement);
   mechanics::BodyContact& contact = objective_.contact().bodies();
   contact.update_gaps(positions.local());
-  std::set<int32_t> here;
-  for (const mechanics::LinearGap& gap : contact.other_sides(positions.local()))
-    here.insert(contact.pairs().body[gap.constraint]);
+  std::set<int32_t> here = contact.bodies_near_edges(positions.local());
   const std::vector<int32_t> all =
       base::gather(positions.comm(), std::vector<int32_t>(here.begin(), here.end()));
   here.insert(all.begin(), all.end());
@@ -197,7 +195,7 @@ bool OtherRestSearch::change_sides(Vec displacement, double accuracy, std::set<s
 void OtherRestSearch::find(Vec displacement, double accuracy, Outcome& outcome) {
   constexpr int max_passes = 3;  // after a change, other points may follow
   if (!outcome.converged || outcome.overlapped > 0) return;
-  const std::vector<int32_t> bodies = pressed_near_edges(displacement);
+  const std::vector<int32_t> bodies = touched_near_edges(displacement);
   if (bodies.empty()) return;
   const int64_t evaluated = objective_.evaluations();
   std::set<size_t> tried;

@@ -9,7 +9,7 @@
 
 namespace repose::solve {
 
-/// Finds other rest positions of tissue that presses on bodies near edges of these
+/// Finds other rest positions of tissue that presses or slides on bodies near edges of these
 /// (docs/theory/contact.md): by programs without rounded bodies from the prediction, and from where
 /// tissue rests among bodies that hardly resist; then with single points on the other side of the
 /// edge that they press near. All members collective.
@@ -27,7 +27,7 @@ class OtherRestSearch {
 
  private:
   using End = ContactPrograms::End;
-  std::vector<int32_t> pressed_near_edges(Vec displacement);
+  std::vector<int32_t> touched_near_edges(Vec displacement);
   int64_t pierced(Vec state);
   Outcome settle(Vec displacement, double accuracy);
   void consider(Vec displacement, const ContactPressures& here, double accuracy, Outcome& outcome);

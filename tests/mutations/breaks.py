@@ -484,4 +484,22 @@ BREAKS = [
         "if (false)",
         r"^program\.contact$",
     ),
+    (
+        "tissue that slides has no edges",
+        "const bool touches = multiplier_[c] > 0 || slides(c);",
+        "const bool touches = multiplier_[c] > 0;",
+        r"^program\.contact$",
+    ),
+    (
+        "an instrument that is thin enters no tissue",
+        "return {false, std::min(entered, depth / 2), true};",
+        "return {false, entered, true};",
+        r"^solve\.bone_remarks|^program\.instruments$",
+    ),
+    (
+        "a support is as stiff as the deepest tissue",
+        "ends.support_stiffness[c] / sum(compliance.along(x.subspan(first, layers)));",
+        "ends.support_stiffness[c] * material.deep.young / (x[deepest] - x[first]).norm();",
+        r"^model\.build",
+    ),
 ]

@@ -156,6 +156,25 @@ def test_fused_lips_across_an_incisor_rest_where_they_have_less_energy(folder, e
         assert distance == pytest.approx(0.97, abs=0.1)
 
 
+def test_a_face_on_bone_that_it_slides_along_does_not_jump_as_the_move_grows(folder, environment):
+    """Sliding tissue rests on either side of an edge, too: without the search for the position of less energy
+    the skin changes by 5 mm a mm here."""
+    run = runner(folder, environment)
+    scene = """skin: head_skin.ply
+bones: [{name: skull, file: head_skull.ply}, {name: mandible, file: head_mandible.ply}]
+tissue: {layers: 4, attach: slide}
+moves: [{bone: mandible, translate: [0, %s, 0]}]
+"""
+    faces = []
+    for way in (-4.3, -4.35):
+        (folder / "slides.yaml").write_text(scene % way)
+        done = run("repose-solve", "slides.yaml", "-accuracy", 0.001, "-output", "slides")
+        assert (done.returncode, done.stderr) == (0, ""), done
+        assert OTHER.search(done.stdout)
+        faces.append(skin(folder / "slides.h5")[1])
+    assert np.linalg.norm(faces[1] - faces[0], axis=1).max() < 1.3 * 0.05
+
+
 @real_head
 def test_negative_curvature_of_contact_does_not_make_steps_short(folder, environment):
     """Most of the curvature of the gaps is kept: without it, the jaw's way back takes 31 evaluations."""

@@ -1,6 +1,7 @@
 #pragma once
 #include <algorithm>
 #include <limits>
+#include <set>
 #include <span>
 #include <utility>
 #include <vector>
@@ -86,6 +87,8 @@ class BodyContact {
   /// each point stays beside the place of its body that it was beside.
   void carry(std::span<const Vec3> position, std::span<const RigidBody> before,
              std::vector<LinearGap>& gaps) const;
+  /// Returns the bodies on which points press or slide near edges, ascending. At the latest update.
+  std::set<int32_t> bodies_near_edges(std::span<const Vec3> position) const;
   /// Gaps to first order of points that press on a body near an edge of it, from the body's side
   /// round that edge: negative, at most 2 mm, from a plane more than 60° from the one pressed on.
   /// At most one a constraint. At the latest update.
