@@ -80,7 +80,7 @@ Outcome Minimizer::run(Vec displacement, double accuracy) {
 }
 
 /// Searches and ends by Newton steps. Where limited-memory BFGS stalls, as for nearly
-/// incompressible tissue without its own motion, Newton's method takes its place for good.
+/// incompressible tissue under loads, Newton's method takes its place for good.
 Outcome Minimizer::search_and_finish(Vec displacement, double accuracy) {
   Outcome outcome;
   int64_t iterations = 0;

@@ -168,6 +168,13 @@ Sample deepest_in_prism(const std::array<Vec3, 6>& x, bool at_skin, double apart
   return deepest;
 }
 
+/// The points of a prism, those of its upper triangle first.
+std::array<int64_t, 6> from_the_top(const model::Points& points, std::array<int64_t, 6> corners) {
+  if (points.layer[corners[3]] < points.layer[corners[0]])
+    std::ranges::rotate(corners, corners.begin() + 3);
+  return corners;
+}
+
 /// Adds the prisms that instruments smaller than these have entered.
 void add_prisms(discrete::Objective& objective, PiercedColumns& found) {
   const discrete::Positions& positions = objective.positions();
@@ -179,7 +186,7 @@ void add_prisms(discrete::Objective& objective, PiercedColumns& found) {
     const double depth = depth_of(moved[k]);
     const Sampling rule = in_instrument(depth);
     for (int64_t m = 0; m < part.owned_prisms; ++m) {
-      const auto& corners = part.model.prisms.points[m];
+      const std::array<int64_t, 6> corners = from_the_top(points, part.model.prisms.points[m]);
       const std::array<Vec3, 6> now = base::pick(positions.local(), corners);
       const bool free = std::ranges::any_of(
           corners, [&](int64_t p) { return points.set[p] == model::PointSet::soft_tissue; });
@@ -210,7 +217,8 @@ PiercedColumns find_pierced_columns(discrete::Objective& objective) {
 
 PiercedColumns find_columns_in_instruments(discrete::Objective& objective) {
   const discrete::Part& part = objective.positions().part();
-  if (!part.contact) return {};
+  if (std::ranges::none_of(part.bodies, [](const auto& body) { return body.bone() < 0; }))
+    return {};
   objective.contact().place_bodies();
   PiercedColumns found = find_columns(objective, free_columns(part), false);
   add_prisms(objective, found);
