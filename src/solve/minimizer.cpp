@@ -94,8 +94,9 @@ Outcome Minimizer::search_and_finish(Vec displacement, double accuracy) {
     if (!test_->left_to_finish() || outcome.converged || outcome.stopped) break;
   }
   outcome.iterations = iterations;
-  const bool stalled = progress_->stalled() && !outcome.converged && !outcome.stopped;
-  if (!stalled || tao_->is_chosen() || tao_->method() != Method::preconditioned) return outcome;
+  const bool ended = outcome.converged || outcome.stopped || !outcome.stable;
+  const bool by_newton = TaoSearch::is_chosen() || tao_->method() != Method::preconditioned;
+  if (ended || by_newton || progress_->at_rounding()) return outcome;
   search_by(TAONTR);
   outcome = search_and_finish(displacement, accuracy);
   outcome.iterations += iterations;

@@ -124,12 +124,15 @@ TaoSearch::TaoSearch(discrete::Function& function, linear::TangentSolver& solver
   check(TaoSetMaximumFunctionEvaluations(tao_, 100000));
   check(TaoSetConvergenceTest(tao_, Callbacks::converged, this));
   base::check_options(TaoSetFromOptions(tao_));
-  PetscBool chosen = PETSC_FALSE;
-  check(PetscOptionsHasName(nullptr, nullptr, "-tao_type", &chosen));
-  chosen_ = chosen;
   if (has_type(tao_, TAOLMVM) && begins_with_stiffness(function_.positions()))
     initial_ = std::make_unique<InitialHessian>(tao_, solver_);
   if (method() == Method::newton) make_forcing();
+}
+
+bool TaoSearch::is_chosen() {
+  PetscBool chosen = PETSC_FALSE;
+  check(PetscOptionsHasName(nullptr, nullptr, "-tao_type", &chosen));
+  return chosen;
 }
 
 void TaoSearch::make_forcing() {

@@ -34,8 +34,8 @@ class TaoSearch {
   int64_t run(Vec displacement, bool near, Ends ends);
 
   Method method() const;
-  bool is_chosen() const { return chosen_; }  ///< the method, by `-tao_type`
-  std::string reason() const;                 ///< why the latest search ended
+  static bool is_chosen();     ///< the method, by `-tao_type`
+  std::string reason() const;  ///< why the latest search ended
 
  private:
   struct Callbacks;
@@ -47,8 +47,7 @@ class TaoSearch {
   discrete::Function& function_;
   linear::TangentSolver& solver_;
   TaoHandle tao_;
-  std::unique_ptr<InitialHessian> initial_;  // of limited-memory BFGS, where it is requested
-  bool chosen_ = false;
+  std::unique_ptr<InitialHessian> initial_;    // of limited-memory BFGS, where it is requested
   bool sets_forcing_ = false;                  // of Newton's linear systems; else an option does
   double first_force_ = 0, latest_force_ = 0;  // N, largest block of ∇Φ at these iterates
   bool slowed_ = false;                        // the initial Hessian is to be renewed
