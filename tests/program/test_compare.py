@@ -237,6 +237,7 @@ def test_beyond_the_rim_is_left_out(run, tmp_path):
     assert inner["PREDICTED to ACTUAL"][1:] == [1, 1, 1, 1, 1, 1]
 
 
+@pytest.mark.long
 def test_the_histogram_is_drawn(run, tmp_path):
     pytest.importorskip("matplotlib")
     sphere(tmp_path / "a.ply", 38, n=12), sphere(tmp_path / "b.ply", 40, n=12)

@@ -389,7 +389,7 @@ def points_of(markups):
     return {entry["label"]: np.array(entry["position"]) for entry in entries}
 
 
-@pytest.mark.parametrize("written", [ct_of, segmentation_of])
+@pytest.mark.parametrize("written", [ct_of, pytest.param(segmentation_of, marks=pytest.mark.long)])
 def test_voxels_of_the_shipped_head_become_a_scene(parts, written, tmp_path, environment):
     scene, _, place = propose(tmp_path, environment, written(parts, tmp_path), "-operation",
                               "open the jaw by 6 degrees")

@@ -58,6 +58,7 @@ def test_a_turned_scan_has_the_same_landmarks(run, tmp_path, head, pitch, yaw, r
 
 
 @pytest.mark.skipif(not DATA.is_dir(), reason=f"no real head: {DATA} is missing")
+@pytest.mark.long
 def test_noise_moves_a_flat_nasion_little(run, tmp_path):
     random, found = np.random.default_rng(0), []
     for noise in (0, 0.1, 0.1, 0.1)[:None if RUNS_ALL else 2]:
@@ -81,6 +82,7 @@ def test_a_mirrored_head_has_mirrored_landmarks(run, tmp_path, head):
 
 
 @pytest.mark.skipif(not DATA.is_dir(), reason=f"no real head: {DATA} is missing")
+@pytest.mark.long
 def test_a_small_head_has_the_same_landmarks(run, tmp_path):
     for name, scale in (("head", 1), ("small", 0.75)):
         assert run("repose-landmarks", *turned(tmp_path, f"{DATA}/", scale * np.eye(3)), "-output", name).returncode == 0

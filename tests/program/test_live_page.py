@@ -296,6 +296,7 @@ def test_a_face_of_the_former_plan_is_marked_as_such(live, served):
     assert undone["measured"] == first["measured"] and found["then"]["kind"] == "exact"
 
 
+@pytest.mark.long
 def test_plan_a_and_the_handle_are_shown_where_they_belong(live, served):
     found = browsed(live, served, VIEWS, "1200,900")
     assert found["early"] == [True, ["after", 1, 1]], "no plan A before the first answer"

@@ -80,6 +80,7 @@ def test_adapt_solves_a_coarser_model_within_the_accuracy(head):
     assert checked.returncode == 0, checked
 
 
+@pytest.mark.long
 def test_adapt_keeps_the_scene_s_own_model_where_nothing_else_is_near_enough(head):
     own, message = head("-adapt", "-accuracy", 1e-3)
     assert "discretisation_error" not in last(own) and "solved model" not in message

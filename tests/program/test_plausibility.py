@@ -177,7 +177,7 @@ REAL = ["real_head_solid.yaml", "real_head_mouth.yaml", "real_head_le_fort.yaml"
 
 
 @pytest.mark.skipif(not DATA.is_dir(), reason=f"no real head: {DATA} is missing")
-@pytest.mark.parametrize("scene", REAL)
+@pytest.mark.parametrize("scene", [REAL[0], *(pytest.param(more, marks=pytest.mark.long) for more in REAL[1:])])
 def test_no_false_alarm_on_the_real_head(run, tmp_path, scene):
     for file in [*DATA.iterdir(), *(PROJECT / "meshes").glob("real_head_*")]:
         (tmp_path / file.name).symlink_to(file)

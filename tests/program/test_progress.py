@@ -105,6 +105,7 @@ def test_a_model_that_takes_long_shows_that_it_is_built(environment, tmp_path):
     assert re.search(built, text) and text.endswith("\r\x1b[K")
 
 
+@pytest.mark.long
 def test_the_path_that_is_verified_has_a_bar(environment, tmp_path):
     small_head(environment, tmp_path)
     text = seen([programs() / "repose-solve", "head_jaw_advance.yaml", "-verify_path", "-accuracy", "1"],

@@ -79,6 +79,7 @@ def test_ranks_that_made_their_parts_measure_instruments_and_verify_the_path(run
     assert len(forces[0]) == 3 and forces[0] == pytest.approx(forces[1], abs=0.01)  # N
 
 
+@pytest.mark.long
 def test_a_skin_that_was_solved_in_place_of_the_given_one(run, tmp_path):
     text = (PROJECT / "meshes/head_solid.yaml").read_text()
     text = text.replace(": head_", f": {PROJECT}/meshes/head_")

@@ -87,6 +87,7 @@ def test_the_skin_is_smooth(face):
     assert np.quantile(jump, 0.99) < 0.25
 
 
+@pytest.mark.long
 def test_a_face_scanned_lying_is_in_equilibrium_and_hangs_upright(folder, run, tmp_path):
     (folder / "posture.yaml").symlink_to(PROJECT / "meshes/real_head_springs_posture.yaml")
     result = run("repose-solve", folder / "posture.yaml", "-stability", ranks=2)

@@ -318,6 +318,7 @@ def test_the_view_works_in_a_browser(report, opened, tmp_path):
     assert found["bar"].startswith("movement, mm0")
 
 
+@pytest.mark.long
 def test_it_prints_on_two_pages(report, opened, tmp_path):
     needs_browser()
     page_of(report, tmp_path, opened, "-landmarks", MARKS)

@@ -51,6 +51,7 @@ def test_a_real_scan_becomes_a_mesh(run, tmp_path, name, cells):
 
 
 @real
+@pytest.mark.long
 def test_a_scan_can_be_decimated(run):
     """Its sheets touch in points, which are doubled."""
     made = run("repose-scan", DATA / "bun000.ply", "-output", "scan.ply")

@@ -486,7 +486,8 @@ def wait_for_end(pid, seconds=60):
     return False
 
 
-@pytest.mark.parametrize("signals", [["TERM"], ["INT"], ["HUP"], ["TERM", "INT", "TERM", "HUP"]])
+@pytest.mark.parametrize("signals", [["TERM"], *(pytest.param(more, marks=pytest.mark.long) for more in (
+    ["INT"], ["HUP"], ["TERM", "INT", "TERM", "HUP"]))])
 def test_cancel_ends_the_solver_and_hands_nothing_over(long_run, tmp_path, signals):
     process, solver = long_run
     for name in signals:

@@ -171,6 +171,7 @@ def test_what_cannot_be_followed_is_said_in_a_line(started):
     stand_in.move(chin, far)  # nothing follows any more
 
 
+@pytest.mark.long
 def test_an_answer_of_an_earlier_plan_is_not_shown_after_a_refusal(started):
     stand_in, widget, lines = started
     stand_in.run_until(lambda: widget.follower.reference is not None)

@@ -73,12 +73,14 @@ def test_a_method_that_overwrites_memory_is_refused(run, method, prefix):
     assert result.returncode == 1 and f"-{prefix}ksp_type gltr" in result.stderr, result
 
 
+@pytest.mark.long
 def test_lmvm_from_the_stiffness_minimizes_forces(solved):
     forces = "-functional", "force", "-volume", "none", "-accuracy", ACCURACY
     default, other = (last(solved(ADVANCE, *forces, *more)) for more in ((), STIFFNESS))
     assert apart(default, other) <= 2 * ACCURACY
 
 
+@pytest.mark.long
 def test_trust_region_and_line_search_find_the_same_face_of_the_finer_head(solved):
     trusting = solved(FINER, "-accuracy", ACCURACY, ranks=2)
     searching = solved(FINER, "-accuracy", ACCURACY, "-tao_type", "nls", ranks=2)

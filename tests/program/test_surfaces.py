@@ -71,6 +71,7 @@ def test_decimation_prints_and_keeps_its_bound(run, tmp_path):
     assert len(mesh.cells_dict["triangle"]) == after < 0.7 * before
 
 
+@pytest.mark.long
 def test_decimation_to_a_count_prints_its_distance(run, tmp_path):
     result = run("repose-decimate", SKULL, "-triangles", "300", "-output", "coarse.ply")
     assert (result.returncode, result.stderr) == (0, ""), result

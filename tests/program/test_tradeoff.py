@@ -100,6 +100,7 @@ def test_the_map_is_of_the_whole_face(folder):
     assert values[:, 3:].max(axis=0) == pytest.approx(largest, rel=1e-3)
 
 
+@pytest.mark.long
 def test_two_ranks_find_the_same_errors(run, folder, tmp_path):
     result = run("repose-tradeoff", SCENE, *FEW, "-output", "two", ranks=2)
     assert result.returncode == 0, result
