@@ -40,6 +40,12 @@ namespace repose::app {
 
 namespace {
 
+/// On rank 0.
+void add_summary(const std::filesystem::path& file, const std::string& text) {
+  const std::string refused = results::add_summary(file, text);
+  if (!refused.empty()) fmt::print(stderr, "warning: {}\n", refused);
+}
+
 const MPI_Comm comm = MPI_COMM_WORLD;
 
 void print(const std::string& text) {
@@ -296,10 +302,7 @@ base::Exit Run::solve() {
                            report_row("result", "{}.h5, {}_*.xdmf (ParaView)", name_, name_) +
                            given;
   print(text);
-  base::on_root(comm, [&] {
-    const std::string refused = results::add_summary(name_ + ".h5", text);
-    if (!refused.empty()) fmt::print(stderr, "warning: {}\n", refused);
-  });
+  base::on_root(comm, [&] { add_summary(name_ + ".h5", text); });
   const bool holds =
       summary.path.complete() && !folded && !coarser.misses_continuum && (!path || path->holds());
   return holds ? base::Exit::done : base::Exit::not_converged;
