@@ -45,9 +45,10 @@ std::array<std::array<double, 4>, 2> spline_weights(double t) {
 struct AtPoint {
   double gap = considered;  // mm, the smaller of the next two
   double body_gap = considered, wall_gap = considered;
-  double other_wall_gap = considered;  // where the nearest place of a side is one of two
-  int32_t body = -1;                   // that it is to; −1: the side of a cut
-  std::vector<int32_t> pressing;       // bodies that may press
+  std::vector<double> wall_gaps;         // of all places, at all minima
+  double largest_wall_gap = considered;  // smallest over the places of their largest
+  int32_t body = -1;                     // that it is to; −1: the side of a cut
+  std::vector<int32_t> pressing;         // bodies that may press
   bool slides = false, mesh = false, wall = false;
   double area = 0;  // mm², that the point stands for
 };
@@ -194,7 +195,8 @@ void add_cut_faces(const model::Model& model, const std::vector<Vec3>& position,
     if (at.gap[0] < point.gap) point.body = -1;
     point.gap = std::min(point.gap, at.gap[0]);
     point.wall_gap = std::min(point.wall_gap, at.gap[0]);
-    point.other_wall_gap = std::min(point.other_wall_gap, at.gap[1]);
+    point.largest_wall_gap = std::min(point.largest_wall_gap, std::ranges::max(at.gap));
+    point.wall_gaps.insert(point.wall_gaps.end(), at.gap.begin(), at.gap.end());
   }
 }
 
@@ -299,6 +301,18 @@ bool Claims::explained(int64_t point, double stated) const {
   return false;
 }
 
+/// The gap of a point that is nearest to a stated one: that of each of its places may be at any
+/// minimum.
+double nearest_gap(const AtPoint& point, double stated) {
+  double nearest = point.gap;
+  const auto offer = [&](double gap) {
+    if (std::abs(stated - gap) < std::abs(stated - nearest)) nearest = gap;
+  };
+  for (const double gap : point.wall_gaps)
+    if (gap <= point.largest_wall_gap) offer(std::min(point.body_gap, gap));
+  return nearest;
+}
+
 void Claims::check_gaps(const std::vector<double>& stated) {
   std::vector<double> gaps, again;
   Worst worst;
@@ -307,9 +321,7 @@ void Claims::check_gaps(const std::vector<double>& stated) {
     const bool at_cut = point.wall_gap < point.body_gap - 2 * allowed(point.body_gap);
     if (!point.mesh || at_cut) {
       gaps.push_back(stated[i]);
-      const double other = std::min(point.body_gap, point.other_wall_gap);
-      const bool is_other = std::abs(stated[i] - other) < std::abs(stated[i] - point.gap);
-      again.push_back(is_other ? other : point.gap);
+      again.push_back(nearest_gap(point, stated[i]));
     } else if (!explained(static_cast<int64_t>(i), stated[i])) {
       worst.offer(std::abs(stated[i] - point.gap), [&] {
         return fmt::format(

@@ -126,6 +126,22 @@ double gap_from(const Side& side, const Vec3& place, const Parameters& start, do
   return opposite ? normal.normalized().dot(offset) : offset.norm();
 }
 
+/// By long and by short steps from the nearest of a side's points at whole parameters, then by long
+/// ones from those around it.
+std::vector<double> gaps_around(const Side& side, const Vec3& place) {
+  const Parameters start = nearest_whole(side, place);
+  std::vector<double> gaps = {gap_from(side, place, start, 1.0 / 4),
+                              gap_from(side, place, start, 1.0 / 32)};
+  for (const int i : {-1, 0, 1})
+    for (const int j : {-1, 0, 1}) {
+      const Parameters from = start + Parameters(i, j);
+      if (from.minCoeff() >= 0 && (side.end() - from).minCoeff() >= 1 && from != start)
+        for (const double first : {1.0 / 4, 1.0 / 32})
+          gaps.push_back(gap_from(side, place, from, first));
+    }
+  return gaps;
+}
+
 }  // namespace
 
 std::vector<CutGap> cut_gaps(const model::CutFaces& cuts, std::span<const Vec3> position) {
@@ -139,9 +155,7 @@ std::vector<CutGap> cut_gaps(const model::CutFaces& cuts, std::span<const Vec3> 
     for (size_t c = 0; c < count; ++c, ++place) {
       if (!(cuts.area[place] > 0)) continue;
       const Vec3 at = own.point({c / rows, c % rows});
-      const Parameters start = nearest_whole(other, at);
-      gaps.push_back({cuts.point[cuts.begin[first + c]],
-                      {gap_from(other, at, start, 1.0 / 4), gap_from(other, at, start, 1.0 / 32)}});
+      gaps.push_back({cuts.point[cuts.begin[first + c]], gaps_around(other, at)});
     }
     first += 2 * count;
   }

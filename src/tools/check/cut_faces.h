@@ -1,5 +1,4 @@
 #pragma once
-#include <array>
 #include <span>
 #include <vector>
 
@@ -9,8 +8,8 @@ namespace repose::tools::check {
 
 /// Gap of one place on the first side of a cut to the second side.
 struct CutGap {
-  int64_t point;              ///< at which the place counts
-  std::array<double, 2> gap;  ///< mm, by long and by short steps: they differ between two minima
+  int64_t point;            ///< at which the place counts
+  std::vector<double> gap;  ///< mm, at the minima of the distance that searches from around end at
 };
 
 /// Returns the gaps between the sides of all cuts, as docs/reference/formats.md defines them.
