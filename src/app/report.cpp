@@ -163,7 +163,7 @@ std::string describe_pierced(const std::vector<std::string>& bodies, const solve
         s.pierced.columns, noun(s.pierced.columns), s.pierced.depth, bodies[s.pierced.body],
         s.pierced.where);
   const solve::PiercedColumns& by = s.pierced_by_instrument;
-  if (by.columns + by.prisms > 0)
+  if (by.count() > 0)
     text += report_row("pierced by instrument",
                        "{}, up to {:.2g} mm deep, the deepest by {} at {:.1f} mm; push it "
                        "less far, use a finer skin (tissue.edge) or, where it slides, skin: stick",

@@ -29,7 +29,7 @@ TangentSolver::TangentSolver(discrete::Positions& positions, discrete::Hessian& 
 }
 
 void TangentSolver::make_krylov() {
-  constexpr double coarsest = 0.9;  // of what solves request
+  constexpr double coarsest = 0.9;  // relative residual; no solve requests more
   check(KSPCreate(positions_.comm(), krylov_.out()));
   check(KSPSetType(krylov_, KSPCG));
   check(KSPSetNormType(krylov_, KSP_NORM_NATURAL));

@@ -17,7 +17,7 @@ Contains contains_of(const scene::Region& region, double near = 0);
 /// vertex nearest to it, within 10 mm, is painted.
 Contains contains_of_skin(const scene::SkinRegion& region);
 
-/// Whether tissue at a place, of a column with its top at a point of the skin, lies in a region.
+/// Test of tissue: true at a place in a region, in a column whose top is at a point of the skin.
 using ContainsTissue = std::function<bool(const Vec3& place, const Vec3& skin)>;
 
 /// Returns a test of whether tissue lies in a region: in space where its place does, and in a

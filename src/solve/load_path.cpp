@@ -238,7 +238,7 @@ void LoadPath::refuse_end() {
   Outcome& last = result_.last;
   if (result_.load < 1 || !last.converged) return;
   const PiercedColumns by = find_columns_in_instruments(objective_);
-  last.pierced = by.columns + by.prisms;
+  last.pierced = by.count();
   if (last.overlapped == 0 && last.pierced == 0) return;
   last.converged = false;
   last.reason =

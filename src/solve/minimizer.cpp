@@ -79,7 +79,7 @@ Outcome Minimizer::run(Vec displacement, double accuracy) {
   return outcome;
 }
 
-/// Searches and ends by Newton steps. Where limited-memory BFGS stalls, as for nearly
+/// Searches and ends by Newton steps. Where limited-memory BFGS fails, as for nearly
 /// incompressible tissue under loads, Newton's method takes its place for good.
 Outcome Minimizer::search_and_finish(Vec displacement, double accuracy) {
   Outcome outcome;

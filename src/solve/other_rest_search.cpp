@@ -84,8 +84,7 @@ std::vector<Vec3> OtherRestSearch::displacements(Vec state) {
 /// Returns how much tissue instruments are in, at a state. Collective.
 int64_t OtherRestSearch::pierced(Vec state) {
   objective_.positions().update(state);
-  const PiercedColumns by = find_columns_in_instruments(objective_);
-  return by.columns + by.prisms;
+  return find_columns_in_instruments(objective_).count();
 }
 
 /// Settles without points that are released from a body: these have less energy than the rest

@@ -101,8 +101,9 @@ class StrataForces {
   /// Adds the forces of elastic supports by their share of the stratum.
   void add_supports(size_t stratum, std::vector<Vec3>& force) const {
     const discrete::Part& part = positions().part();
-    for (model::TermElements supports : part.model.elements) {
-      if (supports.term != "elastic_support") continue;
+    for (const model::TermElements& elements : part.model.elements) {
+      if (elements.term != "elastic_support") continue;
+      model::TermElements supports = elements;
       for (size_t e = 0; e < supports.size(); ++e)
         supports.numbers[e * static_cast<size_t>(supports.numbers_each) + 3] *=
             support_shares_[e][stratum];

@@ -24,7 +24,7 @@ struct ErrorEstimate {
 };
 
 /// Minimizes a function with TAO until the rest position is near enough, in mm. Newton for springs;
-/// limited-memory BFGS for a solid, and Newton where that stalls; `-tao_type` chooses any
+/// limited-memory BFGS for a solid, and Newton where that fails; `-tao_type` chooses any
 /// unconstrained TAO method, and all `-tao_…`, `-ksp_…`, `-pc_…` options apply. `-tao_type lmvm
 /// -tao_lmvm_initial stiffness` is limited-memory BFGS that begins with the stiffness at the start
 /// of the search, and again where it has slowed (initial_hessian.h). Its parts: TAO (tao_search.h),

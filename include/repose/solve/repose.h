@@ -115,6 +115,7 @@ struct PiercedColumns {
   int32_t body = -1;          ///< of the model's contact: that at the deepest place
   double depth = 0;           ///< mm, there
   Vec3 where = Vec3::Zero();  ///< mm, there, where the run ended
+  int64_t count() const { return columns + prisms; }
 };
 
 /// Outcome of a solve, for the end-of-run summary.
