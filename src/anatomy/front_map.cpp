@@ -61,9 +61,17 @@ std::optional<double> FrontMap::depth(double x, double z) const {
 
 std::optional<double> FrontMap::foremost(double x, double z, double half_width) const {
   std::optional<double> best;
-  for (double at = x - half_width; at <= x + half_width; at += spacing_)
+  for (const double at : steps(x - half_width, x + half_width))
     if (const auto y = depth(at, z); y && (!best || *y < *best)) best = y;
   return best;
+}
+
+std::vector<double> FrontMap::steps(double from, double to, int sign) const {
+  constexpr double rounding = 1e-6;  // of a cell
+  const double step = sign * spacing_, cells = (to - from) / step;
+  std::vector<double> found;
+  for (int i = 0; i <= cells + rounding; ++i) found.push_back(from + i * step);
+  return found;
 }
 
 std::vector<ProfilePoint> FrontMap::profile(double from_z, double to_z, double half_width,

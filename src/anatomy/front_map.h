@@ -25,6 +25,9 @@ class FrontMap {
   double low_z() const { return low_.y(); }
   double high_z() const { return low_.y() + spacing_ * static_cast<double>(rows_); }
   double spacing() const { return spacing_; }  ///< mm, of the cells
+  /// Returns coordinates a cell apart, upwards (sign 1) or downwards (−1), up to `to`, which
+  /// rounding does not leave out.
+  std::vector<double> steps(double from, double to, int sign = 1) const;
 
   /// The foremost points within `half_width` of x = `aside`, the midline by default, between two
   /// heights, from below, at the middles of cells.

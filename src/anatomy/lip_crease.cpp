@@ -33,7 +33,7 @@ struct Gap {
 /// The foremost y of a column from a height on over `near`.
 std::optional<double> lip_above(const FrontMap& skin, double x, double z) {
   std::optional<double> lip;
-  for (double at = z; at <= z + near; at += skin.spacing())
+  for (const double at : skin.steps(z, z + near))
     if (const auto y = skin.depth(x, at); y && (!lip || *y < *lip)) lip = y;
   return lip;
 }
@@ -42,7 +42,7 @@ std::optional<double> lip_above(const FrontMap& skin, double x, double z) {
 /// seen above it. Nothing where it comes forward gradually: lips that touch, the lower far behind.
 std::optional<double> low_end(const FrontMap& skin, double x, double high, double lip) {
   const auto is_lip = [&](std::optional<double> y) { return y && *y <= lip + overjet; };
-  for (double low = high; high - low < widest_gap; low -= skin.spacing()) {
+  for (const double low : skin.steps(high, high - widest_gap, -1)) {
     const auto back = skin.depth(x, low), next = skin.depth(x, low - skin.spacing()),
                ahead = skin.depth(x, low - near);
     if (!is_lip(next)) continue;
@@ -55,7 +55,7 @@ std::optional<double> low_end(const FrontMap& skin, double x, double high, doubl
 /// The uppermost gap whose upper end lies between two heights: skin is missing there, or steps back
 /// behind the lip above it.
 std::optional<Gap> gap_between(const FrontMap& skin, double x, double top, double bottom) {
-  for (double z = top; z >= bottom; z -= skin.spacing()) {
+  for (const double z : skin.steps(top, bottom, -1)) {
     const auto lip = lip_above(skin, x, z), next = skin.depth(x, z - skin.spacing());
     if (!lip || (next && *next <= *lip + behind)) continue;
     const double high = z - skin.spacing();
@@ -70,7 +70,7 @@ std::optional<Gap> middle_gap(const FrontMap& skin, double z) {
   constexpr double parted = 0.3;                           // of the columns
   std::optional<Gap> nearest;
   int columns = 0, open = 0;
-  for (double x = 0; x <= middle; x += skin.spacing())
+  for (const double x : skin.steps(0, middle))
     for (const int side : {-1, 1}) {
       const auto gap = gap_between(skin, side * x, z + above, z - below);
       ++columns;
@@ -86,10 +86,11 @@ std::optional<Gap> middle_gap(const FrontMap& skin, double z) {
 std::optional<double> mean_depth(const FrontMap& skin, double x, double z) {
   double sum = 0;
   int columns = 0;
-  for (double at = x - averaged; at <= x + averaged; at += skin.spacing(), ++columns) {
+  for (const double at : skin.steps(x - averaged, x + averaged)) {
     const auto depth = crease_depth(skin, at, z);
     if (!depth) return std::nullopt;
     sum += *depth;
+    ++columns;
   }
   return sum / columns;
 }
@@ -102,9 +103,9 @@ struct Deepest {
 
 /// The place within `reach` of z at which the crease is deepest, of a flat stretch its middle.
 std::optional<Deepest> deepest(const FrontMap& skin, double x, double z, double reach) {
-  constexpr double flat = 0.2, stretch = 2;  // mm
+  constexpr double flat = 0.2, stretch = 2.25;  // mm; between heights of cells
   std::vector<Deepest> places;
-  for (double at = z - reach; at <= z + reach; at += skin.spacing())
+  for (const double at : skin.steps(z - reach, z + reach))
     if (const auto depth = mean_depth(skin, x, at))
       places.push_back({at, *depth, *skin.depth(x, at)});
   if (places.empty()) return std::nullopt;
@@ -131,7 +132,7 @@ std::vector<Vec3> follow_side(const FrontMap& skin, const Vec3& from, double dep
     const double line = left * from.z() + (1 - left) * end->z();
     return std::clamp(next, line - left * bow, line + left * bow);
   };
-  for (double x = std::abs(from.x()) + step; x <= last; x += step) {
+  for (const double x : skin.steps(std::abs(from.x()) + step, last)) {
     const auto place = deepest(skin, side * x, expected(x), climb);
     if (!place) break;
     shallow = place->depth < share * depth ? shallow + step : 0;
@@ -152,7 +153,7 @@ LipCrease follow_gap(const FrontMap& skin, const Gap& first) {
   for (const int side : {-1, 1}) {
     Gap last = first;
     std::vector<Vec3> points;
-    for (double x = 0; x <= widest_half; x += skin.spacing()) {
+    for (const double x : skin.steps(0, widest_half)) {
       const auto gap = gap_between(skin, side * x, last.high + near, last.low);
       if (!gap || (x > 0 && std::abs(gap->middle() - last.middle()) > 2 * climb)) {
         if (x > middle) break;
@@ -189,7 +190,7 @@ std::vector<Vec3> mirrored(const FrontMap& skin, const std::vector<Vec3>& crease
   std::vector<Vec3> points;
   const int side = end.x() < 0 ? -1 : 1;
   double last = end.y();
-  for (double x = std::abs(end.x()) + skin.spacing(); x <= half; x += skin.spacing()) {
+  for (const double x : skin.steps(std::abs(end.x()) + skin.spacing(), half)) {
     const double z = end.z() + height(-side * x) - height(-end.x());
     const auto depth = skin.depth(side * x, z);
     if (!depth || *depth > last + behind) break;

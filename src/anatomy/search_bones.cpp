@@ -25,9 +25,9 @@ std::optional<Vec3> tooth_edge(const FrontMap& map, int sign, const ProfilePoint
                                double to_z, double reach) {
   constexpr double level = 1;  // mm
   std::vector<ProfilePoint> edges;
-  for (double x = -incisors; x <= incisors; x += map.spacing()) {
+  for (const double x : map.steps(-incisors, incisors)) {
     std::optional<ProfilePoint> end;
-    for (double z = start.y(); sign * (to_z - z) >= 0; z += sign * map.spacing()) {
+    for (const double z : map.steps(start.y(), to_z, sign)) {
       const auto depth = map.depth(x, z);
       if (depth && std::abs(*depth - start.x()) <= reach)
         end = ProfilePoint(*depth, z);
@@ -48,10 +48,10 @@ double middle_of_chin(const FrontMap& map, double low) {
   constexpr double above = 4, height = 12, half = 30, arch = 8;  // mm
   constexpr double near = 4;                                     // mm, that a head may have
   std::vector<double> middles;
-  for (double z = low + above; z <= low + above + height; z += map.spacing()) {
+  for (const double z : map.steps(low + above, low + above + height)) {
     const auto front = map.foremost(0, z, half);
     double right = half, left = -half;
-    for (double x = -half; x <= half; x += map.spacing()) {
+    for (const double x : map.steps(-half, half)) {
       const auto depth = map.depth(x, z);
       if (!front || !depth || *depth > *front + arch) continue;
       right = std::min(right, x);
@@ -189,9 +189,9 @@ std::optional<double> nasal_floor(const FrontMap& map, const ProfilePoint& edge)
   constexpr double inner = 3, outer = 8, drop = 6, over = 2;  // mm
   constexpr double lowest = 12, highest = 50;                 // mm above the edge
   std::vector<double> heights;
-  for (double aside = inner; aside <= outer; aside += map.spacing())
+  for (const double aside : map.steps(inner, outer))
     for (const int side : {-1, 1})
-      for (double z = edge.y() + lowest; z <= edge.y() + highest; z += map.spacing()) {
+      for (const double z : map.steps(edge.y() + lowest, edge.y() + highest)) {
         const auto below = map.depth(side * aside, z - over), here = map.depth(side * aside, z);
         if (below && here && *here - *below < drop) continue;
         if (below) heights.push_back(z - over / 2);

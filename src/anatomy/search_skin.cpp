@@ -16,7 +16,7 @@ std::optional<double> crease_height(const FrontMap& skin, double edge) {
   if (const auto gap = open_mouth(skin, edge)) return gap;
   std::optional<double> height;
   double maximum = -INFINITY;
-  for (double z = edge - below; z <= edge + above; z += skin.spacing()) {
+  for (const double z : skin.steps(edge - below, edge + above)) {
     double sum = 0;
     int count = 0;
     for (const double x : {-6.0, -4.0, -2.0, 0.0, 2.0, 4.0, 6.0})

@@ -122,8 +122,11 @@ void OtherRestSearch::consider(Vec displacement, const ContactPressures& here, d
     take_other(displacement, accuracy, std::move(there), outcome);
     return;
   }
-  if (is_other && !less && end == End::reached && pierced(start_) == 0)
+  if (is_other && !less && end == End::reached && pierced(start_) == 0) {
     keep_farther(std::move(other), outcome);
+    candidates_.push_back({objective_.positions().make_vector(), penalty_.multipliers()});
+    check(VecCopy(start_, candidates_.back().displacement));
+  }
   penalty_.set_multipliers(here);
 }
 
@@ -160,7 +163,7 @@ OtherRestSearch::End OtherRestSearch::change_side(const OtherSide* side, Vec dis
 /// position that is left is the outcome's other one. Returns whether there was one. Collective.
 bool OtherRestSearch::change_sides(Vec displacement, double accuracy, std::set<size_t>& tried,
                                    Outcome& outcome) {
-  constexpr int max_tried = 8;
+  constexpr int max_failed = 3;  // in a row
   constexpr double none = std::numeric_limits<double>::infinity();
   discrete::Positions& positions = objective_.positions();
   programs_.evaluate(displacement);
@@ -168,7 +171,7 @@ bool OtherRestSearch::change_sides(Vec displacement, double accuracy, std::set<s
   std::erase_if(sides, [&](const OtherSide& s) { return tried.contains(s.gap.constraint); });
   size_t next = 0;
   bool changed = false;
-  for (int n = 0; n < max_tried; ++n) {
+  for (int failed = 0; failed < max_failed; ++failed) {
     const ContactPressures here = penalty_.multipliers();
     const double softness = next < sides.size() ? sides[next].softness : none;
     const auto first = base::extreme_over_ranks(positions.comm(), softness, MPI_MINLOC);
@@ -183,6 +186,7 @@ bool OtherRestSearch::change_sides(Vec displacement, double accuracy, std::set<s
     if (there.converged && pierced(start_) <= pierced(displacement)) {
       take_other(displacement, accuracy, there, outcome);
       changed = true;
+      failed = -1;
     } else {
       penalty_.set_multipliers(here);
     }
@@ -191,13 +195,41 @@ bool OtherRestSearch::change_sides(Vec displacement, double accuracy, std::set<s
   return changed;
 }
 
-void OtherRestSearch::find(Vec displacement, double accuracy, Outcome& outcome) {
+/// Changes sides until that ends at no less energy. Returns whether there was a change. Collective.
+bool OtherRestSearch::descend(Vec displacement, double accuracy, Outcome& outcome) {
   constexpr int max_passes = 3;  // after a change, other points may follow
+  std::set<size_t> tried;
+  int passes = 0;
+  while (passes < max_passes && change_sides(displacement, accuracy, tried, outcome)) ++passes;
+  return passes > 0;
+}
+
+/// Changes sides from rest positions that have hardly more energy, too, and takes the end of those
+/// with less. Collective.
+void OtherRestSearch::try_candidates(Vec displacement, double accuracy, Outcome& outcome) {
+  constexpr double hardly = 0.015;  // of the energy
+  for (const Candidate& candidate : std::exchange(candidates_, {})) {
+    const ContactPressures here = penalty_.multipliers();
+    penalty_.set_multipliers(candidate.pressures);
+    check(VecCopy(candidate.displacement, start_));
+    Outcome there;
+    const double more = programs_.evaluate(start_) - outcome.objective;
+    const bool changed = more < hardly * std::abs(outcome.objective) &&
+                         descend(candidate.displacement, accuracy, there);
+    if (changed && is_less(there.objective, outcome.objective)) {
+      check(VecCopy(candidate.displacement, start_));
+      take_other(displacement, accuracy, std::move(there), outcome);
+    } else {
+      penalty_.set_multipliers(here);
+    }
+  }
+}
+
+void OtherRestSearch::find(Vec displacement, double accuracy, Outcome& outcome) {
   if (!outcome.converged || outcome.overlapped > 0) return;
   const std::vector<int32_t> bodies = touched_near_edges(displacement);
   if (bodies.empty()) return;
   const int64_t evaluated = objective_.evaluations();
-  std::set<size_t> tried;
   for (const bool slack : {false, true}) {
     const ContactPressures here = penalty_.multipliers();
     check(VecCopy(prediction_, start_));
@@ -205,8 +237,8 @@ void OtherRestSearch::find(Vec displacement, double accuracy, Outcome& outcome) 
     if (slack) descent_.slacken(start_);
     consider(displacement, here, accuracy, outcome);
   }
-  for (int pass = 0; pass < max_passes; ++pass)
-    if (!change_sides(displacement, accuracy, tried, outcome)) break;
+  descend(displacement, accuracy, outcome);
+  try_candidates(displacement, accuracy, outcome);
   if (outcome.other) outcome.other->bodies = bodies;
   programs_.evaluate(displacement);
   evaluations_ += objective_.evaluations() - evaluated;

@@ -27,12 +27,18 @@ class OtherRestSearch {
 
  private:
   using End = ContactPrograms::End;
+  struct Candidate {  ///< another rest position that programs reached
+    base::VecHandle displacement;
+    ContactPressures pressures;
+  };
   std::vector<int32_t> touched_near_edges(Vec displacement);
   int64_t pierced(Vec state);
   Outcome settle(Vec displacement, double accuracy);
   void consider(Vec displacement, const ContactPressures& here, double accuracy, Outcome& outcome);
   End change_side(const OtherSide* side, Vec displacement, double accuracy);
   bool change_sides(Vec displacement, double accuracy, std::set<size_t>& tried, Outcome& outcome);
+  bool descend(Vec displacement, double accuracy, Outcome& outcome);
+  void try_candidates(Vec displacement, double accuracy, Outcome& outcome);
   void take_other(Vec displacement, double accuracy, Outcome there, Outcome& outcome);
   void keep_farther(OtherRest other, Outcome& outcome);
   OtherRest compare_skins(Vec displacement, std::vector<Vec3> other);
@@ -46,6 +52,7 @@ class OtherRestSearch {
   int64_t evaluations_ = 0;
   ContactPressures at_prediction_;
   base::VecHandle prediction_, start_;
+  std::vector<Candidate> candidates_;
 };
 
 }  // namespace repose::solve

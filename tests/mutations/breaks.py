@@ -462,9 +462,21 @@ BREAKS = [
     ),
     (
         "points at an edge stay on their side",
-        "constexpr int max_tried = 8;",
-        "constexpr int max_tried = 0;",
+        "constexpr int max_failed = 3;",
+        "constexpr int max_failed = 0;",
         r"^program\.contact$",
+    ),
+    (
+        "points change sides from one rest position alone",
+        "constexpr double hardly = 0.015;",
+        "constexpr double hardly = 0;",
+        r"^program\.contact$",
+    ),
+    (
+        "rounding decides how far a lip line is searched for",
+        "stretch = 2.25;",
+        "stretch = 2;",
+        r"^anatomy\.lip_crease",
     ),
     (
         "rest positions are searched for from the prediction alone",

@@ -141,6 +141,21 @@ def test_points_at_an_edge_go_to_the_side_of_less_energy_on_any_ranks(folder, en
 
 @real_head
 @pytest.mark.long
+def test_points_go_round_edges_from_rest_positions_of_hardly_more_energy_too(folder, environment):
+    """From the position of less energy of the first two no point does, and 0.005 N mm more are left."""
+    run = runner(folder, environment)
+    scene = (folder / "real_head_mouth.yaml").read_text()
+    fused = re.sub(r"mouth:.*\n  path:.*\n", "", scene).replace(
+        "  - {bone: mandible, translate: [0, -6, 0]}   # forward is −y\n", "")
+    (folder / "opened.yaml").write_text(fused)
+    for ranks in (1, 3):
+        done = run("repose-solve", "opened.yaml", "-accuracy", 0.01, "-output", "opened", ranks=ranks)
+        assert (done.returncode, done.stderr) == (0, ""), done
+        assert last(folder / "opened.h5")["objective"] == pytest.approx(51.6550, abs=1e-3)
+
+
+@real_head
+@pytest.mark.long
 def test_fused_lips_across_an_incisor_rest_where_they_have_less_energy(folder, environment):
     """On the other side of its edge, 1 mm away, the lower lip has 0.026 N mm more. No point goes round it
     alone, and programs from the prediction do not lead there."""

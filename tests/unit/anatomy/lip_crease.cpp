@@ -17,6 +17,26 @@ void add(surface::Surface& skin, double y, const Eigen::Vector2d& low,
   skin.triangles.push_back({first + 1, first + 3, first + 2});
 }
 
+/// A face whose lips touch along a crease that bends, `shift` above the origin.
+surface::Surface curved_face(double shift) {
+  constexpr int half = 40;
+  surface::Surface skin;
+  for (int x = -half; x <= half; ++x)
+    for (int z = -half; z <= half; ++z) {
+      const double from_crease = z + 3 - 2 * std::cos(0.13 * x + 0.2);
+      skin.points.emplace_back(x, 0.01 * x * x + 3 * std::exp(-from_crease * from_crease / 60),
+                               z + shift);
+    }
+  constexpr int64_t row = 2 * half + 1;
+  for (int64_t x = 0; x + 1 < row; ++x)
+    for (int64_t z = 0; z + 1 < row; ++z) {
+      const int64_t first = x * row + z;
+      skin.triangles.push_back({first, first + row, first + 1});
+      skin.triangles.push_back({first + 1, first + row, first + row + 1});
+    }
+  return skin;
+}
+
 /// A face with an open mouth 40 mm wide: the gap is from −12 to −3 mm, the lower lip lies 8 mm
 /// behind the upper one, and the back of the head is seen through the gap.
 surface::Surface open_face() {
@@ -87,6 +107,22 @@ TEST(LipCrease, AMirroredFaceHasAMirroredPath) {
   ASSERT_EQ(there.size(), mirrored.size());
   for (size_t i = 0; i < there.size(); ++i)
     EXPECT_NEAR(there[i].x(), -mirrored[there.size() - 1 - i].x(), 1e-9);
+}
+
+TEST(LipCrease, MovesWithTheFace) {
+  const auto path = [](double shift) {
+    const Vec3 right(-24, 5.8, shift - 3.3), left(24, 5.8, shift - 5);
+    return find_lip_crease(curved_face(shift), HeadFrame{},
+                           {{"mouth_right", right}, {"mouth_left", left}});
+  };
+  const std::vector<Vec3> there = path(0);
+  ASSERT_GT(there.size(), 20u);
+  for (int k = 1; k <= 40; ++k) {
+    const std::vector<Vec3> moved = path(7.3 * k);
+    ASSERT_EQ(moved.size(), there.size());
+    for (size_t i = 0; i < there.size(); ++i)
+      EXPECT_NEAR((moved[i] - there[i]).z(), 7.3 * k, 1e-6) << "point " << i;
+  }
 }
 
 TEST(LipCrease, ASideThatRunsOnEndsWhereACornerOfTheMouthCanBe) {
