@@ -209,14 +209,18 @@ double contact_stiffness(const scene::Scene& scene, const std::vector<ColumnSums
   // Of the tissue's own stiffness at its thickness, and at the width of a column, where a softer
   // penalty takes many rounds of multipliers.
   constexpr double times = 25, times_at_width = 7;
+  constexpr double largest = 3;  // of the median, so that a stiff part does not decide
   if (scene.contact && scene.contact->stiffness) return *scene.contact->stiffness;
-  std::vector<double> thickness;
+  std::vector<double> thickness, moduli;
   double volume = 0, length = 0;
   for (const ColumnSums& column : columns) {
     thickness.push_back(column.thickness);
+    moduli.push_back(column.volume > 0 ? column.stiffness / column.volume : 0);
     volume += column.volume, length += column.thickness;
   }
-  const double modulus = effective_modulus(columns), width = std::sqrt(volume / length);
+  const double width = std::sqrt(volume / length);
+  const double modulus =
+      std::min(effective_modulus(columns), largest * base::median(std::move(moduli)));
   return std::max(times * modulus / base::median(std::move(thickness)),
                   times_at_width * modulus / width);
 }

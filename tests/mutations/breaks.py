@@ -467,6 +467,12 @@ BREAKS = [
         r"^program\.contact$",
     ),
     (
+        "a stiff implant decides on the stiffness of contact",
+        "constexpr double largest = 3;",
+        "constexpr double largest = 3e9;",
+        f"{MODEL}stiffness",
+    ),
+    (
         "points change sides from one rest position alone",
         "constexpr double hardly = 0.015;",
         "constexpr double hardly = 0;",

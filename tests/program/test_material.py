@@ -211,6 +211,17 @@ def test_strata_regions_and_depths(run, tmp_path):
     assert np.allclose(model["prism/shear_modulus"][inside], 0.05 / 2.6)
 
 
+def test_a_titanium_implant_on_the_chin_goes_with_it(run, tmp_path):
+    """Its modulus, 7 million times that of the tissue, does not decide how stiff contact is elsewhere."""
+    implant = "  material: {regions: [{sphere: {center: [0, -95, -38], radius: 9}, young: 110000}]}"
+    file = solve(run, tmp_path, "implant", scene(implant), "-accuracy", 0.01, "-skip_other_rest")[0]
+    model, step = model_of(file), last(file)
+    inside = np.unique(model["prism/points"][model["prism/modulus"] > 1000])
+    assert len(inside) > 50
+    assert np.abs(step["point/displacement"][inside] - [0, -6, 0]).max() < 0.01
+    assert step["evaluations"] < 100
+
+
 def test_isotropic_springs_have_the_solid_s_modulus_of_compression(run, tmp_path):
     file, report = solve(run, tmp_path, "springs",
                        scene("  springs: {isotropic: {young: 0.015, poisson: 0.45}}"))

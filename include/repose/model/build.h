@@ -199,7 +199,8 @@ struct ColumnSums {
 std::vector<ColumnSums> column_sums(const Model& model, int64_t layers);
 /// N/mm²: the stiffness of all over their volume.
 double effective_modulus(const std::vector<ColumnSums>& columns);
-/// N/mm³, of contact: the scene's, or that of the columns' modulus, thickness and width.
+/// N/mm³, of contact: the scene's, or that of the columns' modulus, thickness and width. A stiff
+/// part of the tissue does not decide.
 double contact_stiffness(const scene::Scene& scene, const std::vector<ColumnSums>& columns);
 /// Refuses a region of a material that holds no prism.
 void require_regions(const std::vector<int64_t>& found, const std::string& file);

@@ -117,5 +117,13 @@ TEST(Stiffness, that_of_contact_follows_the_width_of_columns_where_they_are_slim
   EXPECT_DOUBLE_EQ(of_width(0.5), 7 * modulus / 0.5);
 }
 
+TEST(Stiffness, a_stiff_implant_does_not_decide_on_that_of_contact) {
+  ColumnSums column;
+  column.thickness = 10, column.volume = 160, column.stiffness = 0.02 * column.volume;
+  std::vector<ColumnSums> columns(100, column);
+  for (size_t i = 0; i < 5; ++i) columns[i].stiffness *= 1e5;
+  EXPECT_DOUBLE_EQ(contact_stiffness(scene::Scene{}, columns), 3 * 25 * 0.02 / 10);
+}
+
 }  // namespace stiffness_test
 }  // namespace repose::model
