@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from conftest import PROJECT, runner, some_on_ranks
+from heads import write
 from tissue import last, model_of
 
 DATA = PROJECT.parent / "shared/data/head"
@@ -169,6 +170,31 @@ def test_fused_lips_across_an_incisor_rest_where_they_have_less_energy(folder, e
         assert last(folder / "lips.h5")["objective"] == pytest.approx(19.872, abs=2e-3)
         (distance, *_), = np.array(OTHER.findall(done.stdout), float)
         assert distance == pytest.approx(0.97, abs=0.1)
+
+
+def test_an_implant_that_comes_out_of_the_chin_pushes_the_tissue_there(folder, environment):
+    """docs/guide/surgery.md: an ellipsoid that begins inside the mandible; none of the tissue ends in it."""
+    run, half_axes, center = runner(folder, environment), np.array([14, 5, 6]), np.array([0, -86.2, -60])
+    around, down = np.meshgrid(np.arange(24), np.arange(13), indexing="ij")
+    turn, tilt = around * np.pi / 12, down * np.pi / 12
+    sphere = np.stack([np.sin(tilt) * np.cos(turn), np.sin(tilt) * np.sin(turn), np.cos(tilt)], axis=-1)
+    at = (np.arange(24)[:, None] * 13 + np.arange(12)).ravel()
+    beside = (at + 13) % (24 * 13)
+    triangles = np.concatenate([np.stack([at, at + 1, beside + 1], axis=1), np.stack([at, beside + 1, beside], axis=1)])
+    write(folder / "implant.ply", (sphere * half_axes + center).reshape(-1, 3), triangles)
+    (folder / "augmented.yaml").write_text(SOLID.partition("moves:")[0].replace(
+        "tissue:\n", "  - {name: implant, file: implant.ply}\ntissue:\n")
+        + "moves:\n  - {bone: implant, translate: [0, -4, 0]}\n")
+    done = run("repose-solve", "augmented.yaml", "-accuracy", 0.01, "-output", "augmented")
+    assert (done.returncode, done.stderr) == (0, ""), done
+    assert "bones 'mandible' and 'implant' lie" in done.stdout
+    places, moved = skin(folder / "augmented.h5")
+    ahead = np.linalg.norm(places - [0, -98, -60], axis=1) < 4
+    assert -4 < moved[ahead][:, 1].mean() < -2
+    assert np.linalg.norm(moved[places[:, 2] > 0], axis=1).max() < 0.2
+    model, step = model_of(folder / "augmented.h5"), last(folder / "augmented.h5")
+    free = step["point/position"][model["point/set"] == 0]
+    assert np.linalg.norm((free - center - [0, -4, 0]) / half_axes, axis=1).min() > 0.98
 
 
 def test_a_face_on_bone_that_it_slides_along_does_not_jump_as_the_move_grows(folder, environment):
