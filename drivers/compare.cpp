@@ -24,6 +24,7 @@
 #include "repose/scene/placement.h"
 #include "repose/surface/component.h"
 #include "repose/surface/defects.h"
+#include "repose/surface/edges.h"
 #include "repose/surface/read.h"
 #include "repose/surface/write.h"
 #include "repose/tools/comparison/compare.h"
@@ -295,9 +296,10 @@ void turn(surface::Surface& surface, const std::string& file) {
   std::printf("note: triangles of %s point inward; they are turned\n", file.c_str());
 }
 
-/// Reads a surface; the triangles of one that is closed and faces inward are turned, with a note.
+/// Reads a surface and gives its triangles the same vertices where these coincide; the triangles of
+/// one that is closed and faces inward are turned, with a note.
 surface::Surface read_facing_outward(const std::string& file) {
-  surface::Surface surface = surface::read_surface(file);
+  surface::Surface surface = surface::welded(surface::read_surface(file));
   const surface::Defects defects = surface::inspect(surface, false);
   if (defects.border_edges > 0 || defects.misoriented_edges > 0 || surface::volume_of(surface) >= 0)
     return surface;
@@ -329,11 +331,25 @@ void turn_opposed(surface::Surface& first, surface::Surface& second,
   if (of_second < -clear && of_first > clear) turn(second, files[1]);
 }
 
+/// Refuses surfaces of which one must be in another unit.
+void check_sizes(const surface::Surface& predicted, const surface::Surface& actual,
+                 const std::vector<std::string>& files) {
+  constexpr double largest = 100;
+  const double ratio = surface::bounding_box(actual.points).diagonal().norm() /
+                       surface::bounding_box(predicted.points).diagonal().norm();
+  if (!(ratio >= 1 / largest && ratio <= largest))
+    base::refuse(
+        "{} is {:.4g} times as large as {}, expected {:g} to {:g} times: one of them is not in mm; "
+        "scale it",
+        files[1], ratio, files[0], 1 / largest, largest);
+}
+
 void run(const base::Options& options) {
   require_landmarks(options);
   base::require_writable(options.text("output") + ".vtp");
   surface::Surface predicted = read_facing_outward(options.arguments()[0]);
   surface::Surface actual = read_facing_outward(options.arguments()[1]);
+  check_sizes(predicted, actual, options.arguments());
   turn_opposed(predicted, actual, options.arguments());
   const Marks marks = marks_of(options, "landmarks"),
               actual_marks = marks_of(options, "actual_landmarks");

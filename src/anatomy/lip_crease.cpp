@@ -193,9 +193,8 @@ std::vector<Vec3> mirrored(const FrontMap& skin, const std::vector<Vec3>& crease
   for (const double x : skin.steps(std::abs(end.x()) + skin.spacing(), half)) {
     const double z = end.z() + height(-side * x) - height(-end.x());
     const auto depth = skin.depth(side * x, z);
-    if (!depth || *depth > last + behind) break;
-    last = *depth;
-    points.emplace_back(side * x, *depth, z);
+    if (depth && *depth <= last + behind) last = *depth;  // else it is a gap that is seen through
+    points.emplace_back(side * x, last, z);
   }
   return points;
 }

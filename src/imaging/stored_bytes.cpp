@@ -92,6 +92,7 @@ class NiftiHeader {
   }
 
   bool has_rows() const { return bytes_[254] != 0 || bytes_[255] != 0; }  ///< of its orientation
+  bool has_axes() const { return has_rows() || bytes_[252] != 0 || bytes_[253] != 0; }
   float number(size_t at) const { return std::bit_cast<float>(bits<uint32_t>(at)); }
   /// Bytes of a voxel in the file, which its library may rescale to wider numbers.
   int64_t voxel_bytes() const {
@@ -227,6 +228,12 @@ void check_nifti_header(const std::filesystem::path& file) {
       base::refuse("{}: its spacing along axis {} is {:g} mm; it must be > 0: mend the header",
                    file.string(), "ijk"[axis], spacing);
   }
+  if (!header->has_axes())
+    base::refuse(
+        "{}: qform_code and sform_code are 0, so that it does not say which side is left; one of "
+        "them "
+        "must be > 0: export it with its orientation",
+        file.string());
   for (size_t entry = 0; header->has_rows() && entry < 12; ++entry)
     if (const float mm = header->number(280 + 4 * entry); !(std::abs(mm) <= farthest))
       base::refuse(

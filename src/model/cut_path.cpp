@@ -2,7 +2,6 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <optional>
 #include <set>
 
 #include "repose/base/error.h"
@@ -40,8 +39,11 @@ class PathCutter {
       : place_(std::move(place)), skin_(skin), mesh_(skin), taken_(taken), edges_(taken_edges) {}
 
   Chain cut(const std::vector<Vec3>& path) {
+    std::vector<Foot> feet = on_skin(path);
+    const bool backwards = ends_farther(feet);
+    if (backwards) std::reverse(feet.begin(), feet.end());
     Chain stops;
-    for (const Vec3& x : on_skin(path)) {
+    for (const Vec3& x : thinned(feet)) {
       const int64_t vertex = insert(x);
       if (stops.empty() || stops.back() != vertex) stops.push_back(vertex);
     }
@@ -49,6 +51,7 @@ class PathCutter {
     append(stops.front());
     for (size_t i = 0; i + 1 < stops.size(); ++i) run(stops[i], stops[i + 1]);
     if (chain_.size() < 3) refuse_short(path);
+    if (backwards) std::reverse(chain_.begin(), chain_.end());
     return chain_;
   }
 
@@ -64,12 +67,30 @@ class PathCutter {
         format_point(path.front()), format_point(path.back()));
   }
 
-  /// The points of the path, put on the skin, without those that lie too close together.
-  std::vector<Vec3> on_skin(const std::vector<Vec3>& path) const {
+  /// A point of the path, put on the skin.
+  struct Foot {
+    Vec3 point;
+    double edge;  // mm, of the skin there
+  };
+
+  /// Returns whether the last point is farther than the first from the middle of all, or by the
+  /// next ones where these are as far: a path and its mirror image are cut from the same end.
+  static bool ends_farther(const std::vector<Foot>& feet) {
+    constexpr double rounding = 1e-6;  // mm
+    Vec3 middle = Vec3::Zero();
+    for (const Foot& foot : feet) middle += foot.point / static_cast<double>(feet.size());
+    for (size_t i = 0; i < feet.size() / 2; ++i) {
+      const double more =
+          (feet[feet.size() - 1 - i].point - middle).norm() - (feet[i].point - middle).norm();
+      if (std::abs(more) > rounding) return more > 0;
+    }
+    return false;
+  }
+
+  std::vector<Foot> on_skin(const std::vector<Vec3>& path) const {
     const surface::DistanceTree tree(skin_);
-    std::vector<Vec3> kept;
-    double length = 0, edge = 0;
-    std::optional<Vec3> before;
+    std::vector<Foot> feet;
+    double length = 0;
     for (size_t i = 0; i < path.size(); ++i) {
       const auto foot = tree.nearest(path[i]);
       if (foot.distance > reach)
@@ -77,15 +98,22 @@ class PathCutter {
             "point {} of the path, {}, is {:.1f} mm from the skin, allowed are {} mm; put the "
             "path on the skin",
             i, format_point(path[i]), foot.distance, reach);
-      if (before) length += (foot.point - *before).norm();
-      before = foot.point;
-      edge = mesh_.edge_length(foot.triangle);
-      const auto close = [&] { return (foot.point - kept.back()).norm() < spacing * edge; };
-      const bool last = i + 1 == path.size();
+      if (i > 0) length += (foot.point - feet.back().point).norm();
+      feet.push_back({foot.point, mesh_.edge_length(foot.triangle)});
+    }
+    if (!(length > feet.back().edge)) refuse_short(path);
+    return feet;
+  }
+
+  /// Leaves out points that lie too close together.
+  static std::vector<Vec3> thinned(const std::vector<Foot>& feet) {
+    std::vector<Vec3> kept;
+    for (const Foot& foot : feet) {
+      const auto close = [&] { return (foot.point - kept.back()).norm() < spacing * foot.edge; };
+      const bool last = &foot == &feet.back();
       if (last && kept.size() > 1 && close()) kept.pop_back();
       if (last || kept.empty() || !close()) kept.push_back(foot.point);
     }
-    if (!(length > edge)) refuse_short(path);
     return kept;
   }
 

@@ -8,7 +8,8 @@ using base::check;
 
 namespace {
 
-constexpr double close = 1e-4;  // relative residual of the linear solves; relative change of rounds
+constexpr double close = 1e-4;  // relative change of rounds
+constexpr double exact = 1e-6;  // relative residual of the linear solves
 constexpr double stiffer = 16;  // the penalty about what presses
 constexpr double apart = 1;     // mm that what does not press would have to come nearer
 
@@ -89,7 +90,7 @@ void HeldResponse::hold(Vec forces, Vec response, Vec earlier) {
     if (discrete::largest_block(change_) == 0) return;  // nothing presses
     check(VecAXPY(left_, 1.0, change_));
     check(VecAXPY(earlier, 1.0, response));
-    solve_once(change_, expected > 0 ? std::clamp(close * size / expected, close, coarse) : close);
+    solve_once(change_, expected > 0 ? std::clamp(exact * size / expected, exact, coarse) : exact);
     if (!succeeded()) return;
     check(VecAXPY(response, 1.0, change_));
     size = discrete::largest_block(response);
@@ -103,7 +104,7 @@ void HeldResponse::solve(Vec load, Vec forces, Vec response, Vec earlier) {
   const linear::CgInPlaceOfPreonly cg(solver_.krylov());
   check(VecSet(earlier, 0));
   check(VecCopy(load, left_));
-  solve_once(response, close);
+  solve_once(response, exact);
   if (succeeded()) hold(forces, response, earlier);
   if (succeeded()) return;
   check(VecSet(response, 0));

@@ -53,8 +53,10 @@ Complaint damaged_text(const std::string& file) {
     const size_t last = stop > 0 ? stop - 1 : 0;
     const auto line = 1 + std::count(text.begin(), text.begin() + static_cast<int64_t>(last), '\n');
     size_t begin = last > 0 ? text.rfind('\n', last - 1) + 1 : 0;  // npos + 1 is the beginning
-    base::refuse("{}:{}: truncated, or not a number where one belongs, near {}; export it again",
-                 file, line, base::quote(base::next_line(text, begin)));
+    base::refuse(
+        "{}:{}: truncated, not a number where one belongs, or a vertex that is not there, near {}; "
+        "export it again",
+        file, line, base::quote(base::next_line(text, begin)));
   };
 }
 

@@ -92,6 +92,15 @@ def test_corresponding_vertices_have_the_sign_of_the_surface(run, tmp_path):
         assert found[1:] == pytest.approx([signed, 2, 2, 2, 2, 2], abs=1e-3)
 
 
+def test_triangles_that_share_no_vertices_make_no_rims(run, tmp_path):
+    mesh = meshio.read(sphere(tmp_path / "b.ply", 40, n=20))
+    corners = mesh.points[mesh.cells_dict["triangle"]].reshape(-1, 3)
+    meshio.Mesh(corners, [("triangle", np.arange(len(corners)).reshape(-1, 3))]).write(tmp_path / "soup.ply")
+    sphere(tmp_path / "a.ply", 38)
+    tables = [run("repose-compare", "a.ply", file, "-skip_rim").stdout for file in ("b.ply", "soup.ply")]
+    assert rows(tables[0])["PREDICTED to ACTUAL"] == rows(tables[1])["PREDICTED to ACTUAL"]
+
+
 def test_vertices_in_no_triangle_take_no_part(run, tmp_path):
     for name, radius, stray in (("a", 38, 900), ("b", 40, -900)):
         mesh = meshio.read(sphere(tmp_path / f"{name}.ply", radius, n=20))
@@ -268,6 +277,7 @@ CASES = {
                                      ["marks.csv", "pronasale is missing"]),
     "registered by nothing": (["a.ply", "a.ply", "-register", "upper"], ["-landmarks"]),
     "spacing of zero": (["a.ply", "a.ply", "-spacing", "0"], ["-spacing"]),
+    "meters": (["a.ply", "meters.ply"], ["meters.ply is 0.001 times as large as a.ply", "not in mm"]),
 }
 
 
@@ -275,6 +285,7 @@ CASES = {
 def test_bad_input_is_refused(run, tmp_path, case):
     arguments, words = CASES[case]
     sphere(tmp_path / "a.ply", 30, n=6)
+    sphere(tmp_path / "meters.ply", 0.03, n=6)
     (tmp_path / "text.ply").write_text("no mesh\n")
     (tmp_path / "marks.csv").write_text("# CoordinateSystem = LPS\ntop, 0, 0, 40\n")
     before = sorted(tmp_path.iterdir())

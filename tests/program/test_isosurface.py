@@ -222,6 +222,9 @@ CASES = {
     "NIfTI without spacing": (
         lambda f: v.write_nifti(f / "ct.nii", v.samples(), NO_SPACING), [],
         ["ct.nii", "spacing along axis j is 0 mm"]),
+    "NIfTI without axes": (
+        lambda f: v.write_nifti(f / "ct.nii", v.samples(), sform=0), [],
+        ["ct.nii", "qform_code and sform_code are 0"]),
     "DICOM without spacing": (
         lambda f: v.write_dicom(f / "ct", v.samples(), spacing=NO_SPACING), [], [".dcm", "spacing"]),
     "missing slice": (

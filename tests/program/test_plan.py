@@ -72,6 +72,21 @@ def test_tangents_are_differences_of_faces(run, scene, tmp_path, ranks):
     assert np.percentile(error, 95) < 0.01 and error.max() < 0.1
 
 
+def test_tangents_of_springs_are_solved_as_far_as_those_of_a_solid(run, tmp_path):
+    fields = []
+    for options in ((), ("-ksp_rtol", 1e-9)):
+        result = run("repose-solve", PROJECT / "meshes/head_springs_advance.yaml", "-tangents", "-accuracy", 1e-3,
+                     "-output", tmp_path / "face", *options)
+        assert result.returncode == 0, result
+        with h5py.File(tmp_path / "face.h5") as file:
+            point = file["step"][sorted(file["step"])[-1]]["point"]
+            fields.append({name: point[name][:] for name in point if name.startswith("tangent_")})
+    assert len(fields[0]) >= 6
+    for name, exact in fields[1].items():
+        largest = np.linalg.norm(exact, axis=1).max()
+        assert np.linalg.norm(fields[0][name] - exact, axis=1).max() <= 1e-3 * largest, name
+
+
 @pytest.mark.parametrize("change", [
     ("preset: face", "preset: face, dilatation: nodal"), ("  release: 5 ", "  density: 1.0e-6\n  release: 5 "), ()],
     ids=["nodal dilatation", "gravity that opens an incision", "neither"])

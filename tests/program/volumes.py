@@ -64,7 +64,7 @@ def write_nrrd(file, values, spacing=SPACING, space="left-posterior-superior", c
     return file
 
 
-def write_nifti(file, values, spacing=SPACING, volumes=1):
+def write_nifti(file, values, spacing=SPACING, volumes=1, sform=1):
     """NIfTI-1 with an sform, which is RAS: x and y have the opposite sign."""
     header = bytearray(352)
     to_ras = np.diag([-1.0, -1, 1]) @ np.column_stack([TURN * SPACING, ORIGIN])  # sound in any case
@@ -75,7 +75,7 @@ def write_nifti(file, values, spacing=SPACING, volumes=1):
     struct.pack_into("<8f", header, 76, 1, *spacing, 1, 1, 1, 1)
     struct.pack_into("<2f", header, 108, 352, 1)
     struct.pack_into("<B", header, 123, 2)
-    struct.pack_into("<2h", header, 252, 0, 1)
+    struct.pack_into("<2h", header, 252, 0, sform)
     for row in range(3):
         struct.pack_into("<4f", header, 280 + 16 * row, *to_ras[row])
     header[344:348] = b"n+1\0"

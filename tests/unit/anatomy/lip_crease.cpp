@@ -77,6 +77,21 @@ TEST(LipCrease, AWireInTheMidlineClosesNoMouth) {
     EXPECT_GT(crease.points[i].x(), crease.points[i - 1].x());
 }
 
+TEST(LipCrease, AGapThatIsLostOnOneSideIsFollowedAsFarAsOnTheOther) {
+  surface::Surface skin;
+  add(skin, 0, {-50, -3}, {50, 40});
+  add(skin, 8, {-50, -60}, {50, -24});
+  add(skin, 8, {-50, -24}, {5, -12});  // beyond 5 mm the gap is 12 mm wider at once
+  add(skin, 0, {-50, -12}, {-20, -3});
+  add(skin, 150, {-50, -60}, {5, 40});
+  const FrontMap map(skin, HeadFrame{});
+  const LipCrease crease = follow_crease(map, *open_mouth(map, 1), {}, {});
+  ASSERT_TRUE(crease.lost);
+  EXPECT_NEAR((*crease.lost)[1], 5, 1);
+  EXPECT_NEAR(crease.points.front().x(), -20, 1);
+  EXPECT_NEAR(crease.points.back().x(), 20, 1);
+}
+
 TEST(LipCrease, ASideOnWhichItIsLostIsFollowedAsFarAsTheOther) {
   surface::Surface skin;
   add(skin, 0, {-50, -2}, {50, 40});

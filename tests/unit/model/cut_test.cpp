@@ -73,6 +73,20 @@ TEST(CutPath, runs_straight_between_its_points_on_edges_of_the_skin) {
   EXPECT_NEAR(length, (b - a).norm(), 0.5);
 }
 
+TEST(CutPath, is_the_same_from_its_other_end) {
+  std::vector<Vec3> path;
+  for (int i = 0; i <= 16; ++i) path.emplace_back(13.7 + 2 * i, 22.3 + 4 * std::sin(0.3 * i), 0);
+  std::array<std::vector<Vec3>, 2> places;
+  for (std::vector<Vec3>& found : places) {
+    surface::Surface skin = patches::square(6, 60);
+    const std::vector<Cut> cuts = insert_paths({{path, 2}}, "scene.yaml", skin);
+    for (const int64_t vertex : cuts[0].columns) found.push_back(skin.points[vertex]);
+    std::reverse(path.begin(), path.end());
+  }
+  std::reverse(places[1].begin(), places[1].end());
+  EXPECT_EQ(places[0], places[1]);
+}
+
 TEST(CutPath, follows_a_curved_skin) {
   surface::Surface skin = patches::sphere(50, 3);
   const double before = area(skin);
