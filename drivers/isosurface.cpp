@@ -181,12 +181,24 @@ std::array<std::vector<Vec3>, 2> write_points(const imaging::Volume& volume, dou
   return points;
 }
 
+/// Notes that bones are hardly to be parted where voxels are as large as their joints.
+void note_large_voxels(const imaging::Volume& volume) {
+  constexpr double largest = 3;  // mm
+  for (int axis = 0; axis < 3; ++axis)
+    if (const double mm = volume.spacing(axis); mm > largest)
+      std::printf(
+          "  note: voxels are %.3g mm apart along %c: bone thinner than that may be lost, and "
+          "condyles with it; check these, or export slices of at most %g mm\n",
+          mm, "ijk"[axis], largest);
+}
+
 /// A surface of each of two bones that touch; `files` of points may be empty.
 void write_apart(const imaging::Volume& volume, imaging::Extraction requested,
                  const std::vector<std::string>& files, const std::string& output) {
   if (requested.otsu) requested.level = imaging::otsu_level(volume);
   requested.otsu = false;
   base::Progress progress(MPI_COMM_WORLD);
+  note_large_voxels(volume);
   progress.show("parting the bones", -1);
   const tools::bone_separation::PartedBones bones = tools::bone_separation::part_bones(
       volume, *requested.level,

@@ -5,12 +5,14 @@ import gzip
 import json
 import re
 import shutil
+import zlib
 
 import meshio
 import numpy as np
 import pytest
 
 import volumes as v
+from heads import DATA
 
 WRITERS = {
     "MetaImage": lambda folder, s: v.write_meta(folder / "ct.mha", s),
@@ -296,3 +298,18 @@ def test_no_level_is_refused(run, tmp_path):
     result = run("repose-isosurface", v.write_meta(tmp_path / "ct.mha", v.samples()))
     assert (result.returncode, result.stdout) == (1, "")
     assert "-level HU, -otsu, -label N and -labels" in result.stderr
+
+
+@pytest.mark.skipif(not DATA.is_dir(), reason=f"no real head: {DATA} is missing")
+def test_large_voxels_get_a_note_where_bones_are_parted(run, tmp_path):
+    voxels = np.frombuffer(zlib.decompress((DATA / "head_hu.zraw").read_bytes()), "<i2").reshape(121, 275, 272)
+    voxels[::2, ::2, ::2].tofile(tmp_path / "half.raw")
+    text = re.sub("CompressedDataSize.*\n", "", (DATA / "head_hu.mhd").read_text())
+    for given, half in (("272 275 121", "136 138 61"), ("0.9765625 0.9765625 2", "1.953125 1.953125 4"),
+                        ("CompressedData = True", "CompressedData = False"), ("head_hu.zraw", "half.raw")):
+        assert given in text
+        text = text.replace(given, half)
+    (tmp_path / "half.mhd").write_text(text)
+    result = run("repose-isosurface", "half.mhd", "-level", 226, "-jaw", "-largest", "-output", "bone.ply")
+    assert (result.returncode, result.stderr) == (0, ""), result
+    assert "note: voxels are 4 mm apart along k: bone thinner than that may be lost" in result.stdout
