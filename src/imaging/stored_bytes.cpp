@@ -231,8 +231,7 @@ void check_nifti_header(const std::filesystem::path& file) {
   if (!header->has_axes())
     base::refuse(
         "{}: qform_code and sform_code are 0, so that it does not say which side is left; one of "
-        "them "
-        "must be > 0: export it with its orientation",
+        "them must be > 0: export it with its orientation",
         file.string());
   for (size_t entry = 0; header->has_rows() && entry < 12; ++entry)
     if (const float mm = header->number(280 + 4 * entry); !(std::abs(mm) <= farthest))
