@@ -215,12 +215,12 @@ double contact_stiffness(const scene::Scene& scene, const std::vector<ColumnSums
   double volume = 0, length = 0;
   for (const ColumnSums& column : columns) {
     thickness.push_back(column.thickness);
-    moduli.push_back(column.volume > 0 ? column.stiffness / column.volume : 0);
+    if (column.volume > 0) moduli.push_back(column.stiffness / column.volume);
     volume += column.volume, length += column.thickness;
   }
   const double width = std::sqrt(volume / length);
-  const double modulus =
-      std::min(effective_modulus(columns), largest * base::median(std::move(moduli)));
+  double modulus = effective_modulus(columns);
+  if (!moduli.empty()) modulus = std::min(modulus, largest * base::median(std::move(moduli)));
   return std::max(times * modulus / base::median(std::move(thickness)),
                   times_at_width * modulus / width);
 }

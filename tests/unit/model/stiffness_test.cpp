@@ -125,5 +125,14 @@ TEST(Stiffness, a_stiff_implant_does_not_decide_on_that_of_contact) {
   EXPECT_DOUBLE_EQ(contact_stiffness(scene::Scene{}, columns), 3 * 25 * 0.02 / 10);
 }
 
+TEST(Stiffness, that_of_contact_is_by_columns_that_elements_begin_in) {
+  ColumnSums column, empty;
+  column.thickness = empty.thickness = 10;
+  column.volume = 160, column.stiffness = 0.02 * column.volume;
+  std::vector<ColumnSums> columns(5, column);
+  columns.resize(12, empty);
+  EXPECT_GE(contact_stiffness(scene::Scene{}, columns), 25 * 0.02 / 10);
+}
+
 }  // namespace stiffness_test
 }  // namespace repose::model
