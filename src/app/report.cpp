@@ -155,13 +155,16 @@ std::string describe_pierced(const std::vector<std::string>& bodies, const solve
   std::string text;
   if (bodies.empty()) return text;  // rank 0 has their names
   const auto noun = [](int64_t columns) { return columns == 1 ? "column" : "columns"; };
-  if (s.pierced.columns > 0)
+  if (s.pierced.count() > 0)
     text += report_row(
         "pierced by bone",
-        "{} {}, between the two deepest points of each, up to {:.1f} mm deep, the deepest "
-        "by {} at {:.1f} mm; use a finer skin (tissue.edge) or move less",
-        s.pierced.columns, noun(s.pierced.columns), s.pierced.depth, bodies[s.pierced.body],
-        s.pierced.where);
+        "{}, up to {:.1f} mm deep, the deepest by {} at {:.1f} mm; use a finer skin (tissue.edge) "
+        "or move less",
+        s.pierced.columns > 0
+            ? fmt::format("{} {}, between the two deepest points of each", s.pierced.columns,
+                          noun(s.pierced.columns))
+            : fmt::format("{} prisms of tissue between columns", s.pierced.prisms),
+        s.pierced.depth, bodies[s.pierced.body], s.pierced.where);
   const solve::PiercedColumns& by = s.pierced_by_instrument;
   if (by.count() > 0)
     text += report_row("pierced by instrument",

@@ -27,7 +27,7 @@ struct Sampling {
   double min_depth;  // mm, from which samples count
   bool at_points;    // not only between them
 };
-constexpr Sampling in_bones{true, 1.2, false};
+constexpr Sampling in_bones{true, 1.2, false}, bones_between_columns{true, 0.6, true};
 
 /// The depth of an instrument, mm, at most that of one larger than prisms.
 double depth_of(const mechanics::RigidBody& body) {
@@ -71,12 +71,17 @@ Sample deepest_along(std::span<const Vec3> points, const Rows& rows, const Sampl
   return deepest;
 }
 
+/// The deepest layer of all ranks.
+int32_t deepest_layer(MPI_Comm comm, const discrete::Part& part) {
+  int32_t deepest = 0;
+  for (const int32_t layer : part.model.points.layer) deepest = std::max(deepest, layer);
+  return base::max_over_ranks(comm, deepest);
+}
+
 /// Deepest segments of owned columns.
 std::vector<Rows> deepest_segments(MPI_Comm comm, const discrete::Part& part) {
   const model::Points& points = part.model.points;
-  int32_t deepest = 0;
-  for (const int32_t layer : points.layer) deepest = std::max(deepest, layer);
-  const int64_t last = base::max_over_ranks(comm, deepest);
+  const int32_t last = deepest_layer(comm, part);
   std::vector<Rows> segments;
   for (int64_t i = 0; i + 1 < part.owned_points; ++i)
     if (points.layer[i + 1] == last && points.layer[i] == last - 1 &&
@@ -175,22 +180,25 @@ std::array<int64_t, 6> from_the_top(const model::Points& points, std::array<int6
   return corners;
 }
 
-/// Adds the prisms that instruments smaller than these have entered.
-void add_prisms(discrete::Objective& objective, PiercedColumns& found) {
+/// Adds the prisms that bones have entered above those at bone, whose edges cut its corners, or
+/// that instruments smaller than these have entered.
+void add_prisms(discrete::Objective& objective, bool bones, PiercedColumns& found) {
   const discrete::Positions& positions = objective.positions();
   const discrete::Part& part = positions.part();
   const model::Points& points = part.model.points;
   const std::vector<mechanics::RigidBody>& moved = objective.contact().bodies().bodies();
+  const int32_t last = deepest_layer(positions.comm(), part);
   for (size_t k = 0; k < moved.size(); ++k) {
-    if (moved[k].bone() >= 0) continue;
-    const double depth = depth_of(moved[k]);
-    const Sampling rule = in_instrument(depth);
+    if ((moved[k].bone() >= 0) != bones) continue;
+    const double depth = bones ? bones_between_columns.min_depth : depth_of(moved[k]);
+    const Sampling rule = bones ? bones_between_columns : in_instrument(depth);
     for (int64_t m = 0; m < part.owned_prisms; ++m) {
       const std::array<int64_t, 6> corners = from_the_top(points, part.model.prisms.points[m]);
       const std::array<Vec3, 6> now = base::pick(positions.local(), corners);
       const bool free = std::ranges::any_of(
           corners, [&](int64_t p) { return points.set[p] == model::PointSet::soft_tissue; });
       if (!free || depth >= (now[1] - now[0]).norm()) continue;
+      if (bones && points.layer[corners[3]] == last) continue;
       const bool at_skin = points.layer[corners[0]] == 0;
       const auto in = [&](const std::array<Vec3, 6>& x, const mechanics::RigidBody& body) {
         return deepest_in_prism(x, at_skin, depth, rule, body);
@@ -211,6 +219,7 @@ PiercedColumns find_pierced_columns(discrete::Objective& objective) {
   if (!positions.part().contact) return {};
   PiercedColumns found =
       find_columns(objective, deepest_segments(positions.comm(), positions.part()), true);
+  add_prisms(objective, true, found);
   combine(positions.comm(), found);
   return found;
 }
@@ -221,7 +230,7 @@ PiercedColumns find_columns_in_instruments(discrete::Objective& objective) {
     return {};
   objective.contact().place_bodies();
   PiercedColumns found = find_columns(objective, free_columns(part), false);
-  add_prisms(objective, found);
+  add_prisms(objective, false, found);
   combine(objective.positions().comm(), found);
   return found;
 }

@@ -6,7 +6,8 @@ namespace repose::solve {
 
 /// Finds columns whose deepest segment is inside a bone between its two points: nine samples of the
 /// signed distance along it, deeper than 1.2 mm at the objective's last update and not so
-/// initially. Needs the model's contact with bones; without it nothing is found. Collective.
+/// initially. Finds prisms above the deepest, too, that a bone is deeper in than 0.6 mm between
+/// their columns. Needs the model's contact with bones; without it nothing is found. Collective.
 PiercedColumns find_pierced_columns(discrete::Objective& objective);
 
 /// Finds columns with free points that are inside an instrument at a point, or at one of at least

@@ -6,7 +6,7 @@
 namespace repose::surface {
 namespace {
 
-constexpr double min_size = 20, largest_size = 2000;  // mm, bounding diagonal
+constexpr double min_size = 2, largest_size = 2000;  // mm, bounding diagonal
 
 const char* noun(Role role) {
   return role == Role::skin ? "skin" : role == Role::bone ? "bone" : "mesh";

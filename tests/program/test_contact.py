@@ -172,9 +172,8 @@ def test_fused_lips_across_an_incisor_rest_where_they_have_less_energy(folder, e
         assert distance == pytest.approx(0.97, abs=0.1)
 
 
-def test_an_implant_that_comes_out_of_the_chin_pushes_the_tissue_there(folder, environment):
-    """docs/guide/surgery.md: an ellipsoid that begins inside the mandible; none of the tissue ends in it."""
-    run, half_axes, center = runner(folder, environment), np.array([14, 5, 6]), np.array([0, -86.2, -60])
+def solve_implant(folder, environment, half_axes, center, forward):
+    """The output of a run in which an ellipsoid that begins inside the mandible comes out of it."""
     around, down = np.meshgrid(np.arange(24), np.arange(13), indexing="ij")
     turn, tilt = around * np.pi / 12, down * np.pi / 12
     sphere = np.stack([np.sin(tilt) * np.cos(turn), np.sin(tilt) * np.sin(turn), np.cos(tilt)], axis=-1)
@@ -184,10 +183,17 @@ def test_an_implant_that_comes_out_of_the_chin_pushes_the_tissue_there(folder, e
     write(folder / "implant.ply", (sphere * half_axes + center).reshape(-1, 3), triangles)
     (folder / "augmented.yaml").write_text(SOLID.partition("moves:")[0].replace(
         "tissue:\n", "  - {name: implant, file: implant.ply}\ntissue:\n")
-        + "moves:\n  - {bone: implant, translate: [0, -4, 0]}\n")
-    done = run("repose-solve", "augmented.yaml", "-accuracy", 0.01, "-output", "augmented")
+        + f"moves:\n  - {{bone: implant, translate: [0, -{forward}, 0]}}\n")
+    done = runner(folder, environment)("repose-solve", "augmented.yaml", "-accuracy", 0.01, "-output", "augmented")
     assert (done.returncode, done.stderr) == (0, ""), done
     assert "bones 'mandible' and 'implant' lie" in done.stdout
+    return done.stdout
+
+
+def test_an_implant_that_comes_out_of_the_chin_pushes_the_tissue_there(folder, environment):
+    """docs/guide/surgery.md: an ellipsoid that begins inside the mandible; none of the tissue ends in it."""
+    half_axes, center = np.array([14, 5, 6]), np.array([0, -86.2, -60])
+    assert "pierced by bone" not in solve_implant(folder, environment, half_axes, center, 4)
     places, moved = skin(folder / "augmented.h5")
     ahead = np.linalg.norm(places - [0, -98, -60], axis=1) < 4
     assert -4 < moved[ahead][:, 1].mean() < -2
@@ -195,6 +201,14 @@ def test_an_implant_that_comes_out_of_the_chin_pushes_the_tissue_there(folder, e
     model, step = model_of(folder / "augmented.h5"), last(folder / "augmented.h5")
     free = step["point/position"][model["point/set"] == 0]
     assert np.linalg.norm((free - center - [0, -4, 0]) / half_axes, axis=1).min() > 0.98
+
+
+def test_an_implant_that_passes_between_columns_is_reported(folder, environment):
+    for half_axes, center, forward in (([14, 9, 1.5], [0, -82.2, -60], 6), ([1.2, 12, 1.2], [0.7, -78, -60], 14)):
+        output = solve_implant(folder, environment, half_axes, center, forward)
+        prisms, depth = re.search(r"pierced by bone +(\d+) prisms of tissue between columns, up to (\S+) mm deep, "
+                                  r"the deepest by implant at", output).groups()
+        assert int(prisms) > 0 and 0.6 <= float(depth) <= 1.5
 
 
 def test_a_face_on_bone_that_it_slides_along_does_not_jump_as_the_move_grows(folder, environment):

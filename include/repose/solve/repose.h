@@ -111,7 +111,7 @@ struct ContactSummary {
 /// Columns of tissue that a body has entered since the start.
 struct PiercedColumns {
   int64_t columns = 0;
-  int64_t prisms = 0;         ///< that a small instrument has entered between their columns
+  int64_t prisms = 0;         ///< that something small has entered between their columns
   int32_t body = -1;          ///< of the model's contact: that at the deepest place
   double depth = 0;           ///< mm, there
   Vec3 where = Vec3::Zero();  ///< mm, there, where the run ended
