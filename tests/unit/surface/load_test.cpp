@@ -45,7 +45,7 @@ TEST_F(Load, meters_and_micrometers) {
   EXPECT_TRUE(says(meters, "0.1732 mm across"));
   EXPECT_TRUE(says(meters, "in meters; scale the mesh to millimeters (times 1000)"));
   EXPECT_TRUE(says(refused(scaled(cube(), 1e3), Role::bone), "in micrometers; scale the mesh"));
-  const double side = 20 / std::sqrt(3);
+  const double side = 2 / std::sqrt(3);
   EXPECT_EQ(load_surface(write("small.off", off_text(cube(Vec3::Zero(), 1.001 * side))), Role::bone)
                 .points.size(),
             8u);
