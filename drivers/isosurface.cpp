@@ -183,13 +183,13 @@ std::array<std::vector<Vec3>, 2> write_points(const imaging::Volume& volume, dou
 
 /// Notes that bones are hardly to be parted where voxels are as large as their joints.
 void note_large_voxels(const imaging::Volume& volume) {
-  constexpr double largest = 3;  // mm
+  constexpr double coarse = 3;  // mm
   for (int axis = 0; axis < 3; ++axis)
-    if (const double mm = volume.spacing(axis); mm > largest)
+    if (const double mm = volume.spacing(axis); mm > coarse)
       std::printf(
           "  note: voxels are %.3g mm apart along %c: bone thinner than that may be lost, and "
           "condyles with it; check these, or export slices of at most %g mm\n",
-          mm, "ijk"[axis], largest);
+          mm, "ijk"[axis], coarse);
 }
 
 /// A surface of each of two bones that touch; `files` of points may be empty.
