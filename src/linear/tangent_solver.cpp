@@ -1,6 +1,7 @@
 #include "repose/linear/tangent_solver.h"
 
 #include <algorithm>
+#include <limits>
 
 #include "repose/base/collective.h"
 #include "repose/base/petsc.h"
@@ -76,12 +77,22 @@ void TangentSolver::refresh(Vec displacement) {
 
 void TangentSolver::throw_unsolvable() {
   bool finite = true;
-  hessian_.visit_spd_blocks([&](int32_t, int32_t, const Mat3& block) {
+  double softest = std::numeric_limits<double>::infinity(), stiffest = 0;
+  hessian_.visit_spd_blocks([&](int32_t p, int32_t q, const Mat3& block) {
     if (!block.allFinite()) finite = false;
+    if (p != q) return;
+    softest = std::min(softest, block.trace() / 3);
+    stiffest = std::max(stiffest, block.trace() / 3);
   });
-  if (!base::on_all_ranks(positions_.comm(), finite))
+  const MPI_Comm comm = positions_.comm();
+  if (!base::on_all_ranks(comm, finite))
     discrete::refuse_overflow("stiffnesses", positions_.load());
-  throw base::PetscError("the preconditioner of the stiffness matrix could not be made");
+  softest = -base::max_over_ranks(comm, -softest);
+  stiffest = base::max_over_ranks(comm, stiffest);
+  base::refuse(
+      "stiffnesses at load {:.4g}, {:.2g} to {:.2g} N/mm of a point, lie too far apart for the "
+      "preconditioner; bring the moduli of strata and regions nearer together",
+      positions_.load(), softest, stiffest);
 }
 
 bool TangentSolver::solve(Vec displacement, Vec rhs, Vec delta, double relative_tolerance) {

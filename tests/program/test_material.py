@@ -222,6 +222,16 @@ def test_a_titanium_implant_on_the_chin_goes_with_it(run, tmp_path):
     assert step["evaluations"] < 100
 
 
+@pytest.mark.long
+def test_a_skin_too_stiff_for_its_tissue_is_refused_or_not_at_rest(run, tmp_path):
+    skin = "  material: {young: 0.015, poisson: 0.45, skin: {thickness: 1.5, young: 150000}}"
+    (tmp_path / "stiff.yaml").write_text(scene(skin))
+    result = run("repose-solve", "stiff.yaml", "-accuracy", 0.01, cwd=tmp_path)
+    assert result.returncode in (1, 2), result
+    assert "internal error" not in result.stderr and len(result.stderr.splitlines()) <= 1
+    assert ("lie too far apart" in result.stderr) == (result.returncode == 1)
+
+
 def test_isotropic_springs_have_the_solid_s_modulus_of_compression(run, tmp_path):
     file, report = solve(run, tmp_path, "springs",
                        scene("  springs: {isotropic: {young: 0.015, poisson: 0.45}}"))
