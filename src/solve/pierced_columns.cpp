@@ -79,9 +79,8 @@ int32_t deepest_layer(MPI_Comm comm, const discrete::Part& part) {
 }
 
 /// Deepest segments of owned columns.
-std::vector<Rows> deepest_segments(MPI_Comm comm, const discrete::Part& part) {
+std::vector<Rows> deepest_segments(const discrete::Part& part, int32_t last) {
   const model::Points& points = part.model.points;
-  const int32_t last = deepest_layer(comm, part);
   std::vector<Rows> segments;
   for (int64_t i = 0; i + 1 < part.owned_points; ++i)
     if (points.layer[i + 1] == last && points.layer[i] == last - 1 &&
@@ -180,14 +179,13 @@ std::array<int64_t, 6> from_the_top(const model::Points& points, std::array<int6
   return corners;
 }
 
-/// Adds the prisms that bones have entered above those at bone, whose edges cut its corners, or
-/// that instruments smaller than these have entered.
-void add_prisms(discrete::Objective& objective, bool bones, PiercedColumns& found) {
+/// Adds the prisms above the layer `last` that bones have entered, whose edges cut the corners of
+/// those at bone, or that instruments smaller than these have entered.
+void add_prisms(discrete::Objective& objective, bool bones, int32_t last, PiercedColumns& found) {
   const discrete::Positions& positions = objective.positions();
   const discrete::Part& part = positions.part();
   const model::Points& points = part.model.points;
   const std::vector<mechanics::RigidBody>& moved = objective.contact().bodies().bodies();
-  const int32_t last = deepest_layer(positions.comm(), part);
   for (size_t k = 0; k < moved.size(); ++k) {
     if ((moved[k].bone() >= 0) != bones) continue;
     const double depth = bones ? bones_between_columns.min_depth : depth_of(moved[k]);
@@ -217,9 +215,9 @@ void add_prisms(discrete::Objective& objective, bool bones, PiercedColumns& foun
 PiercedColumns find_pierced_columns(discrete::Objective& objective) {
   const discrete::Positions& positions = objective.positions();
   if (!positions.part().contact) return {};
-  PiercedColumns found =
-      find_columns(objective, deepest_segments(positions.comm(), positions.part()), true);
-  add_prisms(objective, true, found);
+  const int32_t last = deepest_layer(positions.comm(), positions.part());
+  PiercedColumns found = find_columns(objective, deepest_segments(positions.part(), last), true);
+  add_prisms(objective, true, last, found);
   combine(positions.comm(), found);
   return found;
 }
@@ -230,7 +228,7 @@ PiercedColumns find_columns_in_instruments(discrete::Objective& objective) {
     return {};
   objective.contact().place_bodies();
   PiercedColumns found = find_columns(objective, free_columns(part), false);
-  add_prisms(objective, false, found);
+  add_prisms(objective, false, -1, found);
   combine(objective.positions().comm(), found);
   return found;
 }
