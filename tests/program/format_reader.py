@@ -147,22 +147,24 @@ def solid(file, position):
 
 def closest_on_triangles(point, a, b, c):
     """Squared distances [P, T] of points to triangles: to the plane or to an edge."""
+    def along(way, start):
+        return point @ way.T - (start * way).sum(1)
+
     def to_edge(p, q):
         way = q - p
-        length = np.maximum((way**2).sum(-1), 1e-300)
-        share = np.clip(((point[:, None] - p) * way).sum(-1) / length, 0, 1)
-        return ((point[:, None] - p - share[..., None] * way)**2).sum(-1)
+        length = np.maximum((way**2).sum(1), 1e-300)
+        share = np.clip(along(way, p) / length, 0, 1)
+        off = point[:, None] - p - share[..., None] * way
+        return np.einsum("ptx,ptx->pt", off, off)
 
     normal = np.cross(b - a, c - a)
     size = np.linalg.norm(normal, axis=1)
     unit = normal / np.maximum(size, 1e-300)[:, None]
-    height = ((point[:, None] - a) * unit).sum(-1)
-    foot = point[:, None] - height[..., None] * unit
-    inside = np.ones(height.shape, bool)
+    inside = np.tile(size > 0, (len(point), 1))
     for p, q in ((a, b), (b, c), (c, a)):
-        inside &= (np.cross(q - p, foot - p) * unit).sum(-1) >= 0
+        inside &= along(np.cross(unit, q - p), p) >= 0
     edges = np.minimum(np.minimum(to_edge(a, b), to_edge(b, c)), to_edge(c, a))
-    return np.where(inside & (size > 0), height**2, edges)
+    return np.where(inside, along(unit, a)**2, edges)
 
 
 class Mesh:
@@ -177,6 +179,7 @@ class Mesh:
         self.corners = [points[triangles[:, k]] for k in range(3)]
         self.middle = sum(self.corners) / 3
         self.radius = np.max([np.linalg.norm(x - self.middle, axis=1) for x in self.corners], 0)
+        self.low, self.high = np.min(self.corners, 0), np.max(self.corners, 0)
         self.known, self.lines = {}, {}
 
     def coefficients(self, index):
@@ -232,9 +235,9 @@ class Mesh:
 
     def crossings(self, line):
         """x and signs of the triangles that a line in the direction x crosses."""
-        y = [x[:, 1:] - line - self.spacing * np.array([1.1e-7, 2.3e-7]) for x in self.corners]
-        around = (np.min(y, 0) <= 0).all(1) & (np.max(y, 0) >= 0).all(1)
-        y = [at[around] for at in y]
+        line = line + self.spacing * np.array([1.1e-7, 2.3e-7])
+        around = np.flatnonzero(((self.low[:, 1:] <= line) & (self.high[:, 1:] >= line)).all(1))
+        y = [x[around, 1:] - line for x in self.corners]
         side = [p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0]
                 for p, q in ((y[1], y[2]), (y[2], y[0]), (y[0], y[1]))]
         crossed = (np.min(side, 0) > 0) | (np.max(side, 0) < 0)

@@ -20,7 +20,7 @@ SCENE = (PROJECT / "meshes/head_solid.yaml").read_text().partition("moves:")[0].
 mouth: {path: [[-20, -92, -35], [0, -98, -35], [20, -92, -35]]}
 instruments:
   - {sphere: {center: [57, -90, -10], radius: 10}, push: [-9, 12, 0], skin: slide}
-contact: {grid: 1}
+contact: {grid: 2}
 forces:
   - {at: [-50, -75, -30], radius: 10, force: [-0.02, -0.05, 0]}
 moves:
