@@ -30,6 +30,21 @@ def session(environment):
         yield opened
 
 
+@pytest.fixture(scope="module")
+def coarse_scene(tmp_path_factory):
+    """The scene with longer edges and fewer layers."""
+    file = tmp_path_factory.mktemp("coarse") / "coarse.yaml"
+    text = SCENE.read_text().replace(": head_", f": {SCENE.parent}/head_")
+    file.write_text(text.replace("  layers: 4", "  layers: 3\n  edge: 8"))
+    return file
+
+
+@pytest.fixture(scope="module")
+def coarse(coarse_scene, session):
+    with repose.Session(coarse_scene, program=programs() / "repose-live") as opened:
+        yield opened
+
+
 def distance(one, other):
     return np.linalg.norm(one.position - other.position, axis=1).max()
 
@@ -74,40 +89,42 @@ def test_another_rest_position_is_looked_for_on_request(session):
         session.ask({"do": "solve", "plan": plan, "other_rest": 1})
 
 
-def test_tangents_predict_a_face_nearby(session):
-    face = session.solve(A, accuracy=0.01, tangents=True)
+def test_tangents_predict_a_face_nearby(coarse):
+    face = coarse.solve(A, accuracy=0.01, tangents=True)
     assert not face.tangent.missing and len(face.tangent.columns) == 18
     change = {"mandible": {"translate": [0, -0.5, 0], "rotate": [0, 0, 0.5]}}
     near = {**A, "mandible": {"translate": [0, -5.5, 1], "rotate": [2, 0, 0.5]}}
-    exact = session.solve(near, accuracy=0.01)
+    exact = coarse.solve(near, accuracy=0.01)
     error = np.linalg.norm(face.position + face.tangent.displacement(change) - exact.position, axis=1)
     assert distance(face, exact) > 0.4 and np.percentile(error, 95) < 0.05
 
 
-def test_the_gradient_of_a_point_is_the_transpose_of_the_tangents(session):
-    session.change(material={"preset": "face", "skin": {"thickness": 1.5, "young": 0.08}})
-    weights = {700: [0.3, -1, 0.2], 1200: [0, 0.5, 0]}
-    face = session.solve(A, accuracy=0.001, tangents=True, gradient_of=weights)
-    alone = session.solve(A, accuracy=0.001, gradient_of=weights)
+def test_the_gradient_of_a_point_is_the_transpose_of_the_tangents(coarse):
+    coarse.change(material={"preset": "face", "skin": {"thickness": 1.5, "young": 0.08}})
+    weights = {552: [0.3, -1, 0.2], 386: [0, 0.5, 0]}  # chin, lip
+    face = coarse.solve(A, accuracy=0.001, tangents=True, gradient_of=weights)
+    alone = coarse.solve(A, accuracy=0.001, gradient_of=weights)
     along = lambda column: sum(np.dot(column[row], weight) for row, weight in weights.items())
     assert alone.tangent is None and alone.gradient.complete and alone.gradient.pieces.keys() == {
         "maxilla", "mandible", "chin"}
     for name, motion in alone.gradient.pieces.items():
         forward = [along(face.tangent.columns[name, c]) for c in repose.session.COMPONENTS]
         assert np.allclose(motion["translate"] + motion["rotate"], forward, atol=2e-3), name
+    assert np.abs(alone.gradient.pieces["mandible"]["translate"]).max() > 0.1
     assert len(face.tangent.young) == 2
     assert np.allclose(alone.gradient.young, [along(column) for column in face.tangent.young], atol=1e-3)
     factor = 1.05
-    session.change(material={"preset": "face", "skin": {"thickness": 1.5, "young": 0.08 * factor}})
-    stiffer = session.solve(A, accuracy=0.001)
+    coarse.change(material={"preset": "face", "skin": {"thickness": 1.5, "young": 0.08 * factor}})
+    stiffer = coarse.solve(A, accuracy=0.001)
     difference = (stiffer.position - face.position) / np.log(factor)
     largest = np.linalg.norm(difference, axis=1).max()
     assert largest > 0.1
     off = np.linalg.norm(difference - face.tangent.young[0], axis=1)
     assert np.percentile(off, 95) < 0.1 * largest, "a step of 5 %, faces to 0.001 mm"
-    with pytest.raises(repose.Refused, match="gradient_of: point 2000 is none of the answer's 2000 points"):
-        session.solve(A, gradient_of={2000: [0, 0, 1]})
-    session.change()
+    count = len(face.position)
+    with pytest.raises(repose.Refused, match=f"point 2000 is none of the answer's {count} points"):
+        coarse.solve(A, gradient_of={2000: [0, 0, 1]})
+    coarse.change()
 
 
 def test_refusals_name_the_place_and_the_session_goes_on(session):
@@ -150,8 +167,9 @@ def test_a_session_has_a_whole_number_of_ranks():
         repose.Session(SCENE, verify_every=-1)
 
 
-def test_derivatives_refuse_what_the_plan_does_not_have(session):
-    tangent = session.solve(A, tangents=True).tangent
+def test_derivatives_refuse_what_the_plan_does_not_have(coarse):
+    face = coarse.solve(A, accuracy=1, tangents=True)
+    tangent = face.tangent
     with pytest.raises(ValueError, match="'jaw' is no piece of the plan; its pieces are chin, mandible, maxilla"):
         tangent.displacement({"jaw": {"translate": [0, 1, 0]}})
     with pytest.raises(ValueError, match="'chin': turn: a motion has translate and rotate"):
@@ -159,29 +177,29 @@ def test_derivatives_refuse_what_the_plan_does_not_have(session):
     for wrong in ([0, 1], [0, 1, 0, 5], 3, ["a", 0, 0], [0, float("nan"), 0], [[0], 1, 2]):
         with pytest.raises(ValueError, match="'chin': translate must be three finite numbers, not "):
             tangent.displacement({"chin": {"translate": wrong, "rotate": [5, 0, 0]}})
-    assert np.array_equal(tangent.displacement({}), np.zeros((2000, 3)))
+    assert np.array_equal(tangent.displacement({}), np.zeros_like(face.position))
 
 
-def test_a_change_of_material_or_border_is_the_scene_with_these_values(session, environment, tmp_path):
-    before = session.solve(A)
-    text = SCENE.read_text().replace("material: {preset: face}", "material: {preset: face, young: 0.03}")
-    text = text.replace("release: 5", "release: 7").replace(": head_", f": {SCENE.parent}/head_")
+def test_a_change_of_material_or_border_is_the_scene_with_these_values(coarse, coarse_scene, tmp_path):
+    before = coarse.solve(A)
+    text = coarse_scene.read_text().replace("material: {preset: face}", "material: {preset: face, young: 0.03}")
+    text = text.replace("release: 5", "release: 7")
     (tmp_path / "changed.yaml").write_text(text + "boundary: {rim: fixed}\n")
-    session.change(material={"preset": "face", "young": 0.03}, release=7, boundary={"rim": "fixed"})
-    changed = session.solve(A)
+    coarse.change(material={"preset": "face", "young": 0.03}, release=7, boundary={"rim": "fixed"})
+    changed = coarse.solve(A)
     with repose.Session(tmp_path / "changed.yaml", program=programs() / "repose-live") as other:
         assert distance(changed, other.solve(A)) < ROUNDING
     assert distance(changed, before) > 0.1
-    for values, words in (({"material": {"young": -1}}, "head_live.yaml: tissue.material.young"),
+    for values, words in (({"material": {"young": -1}}, "coarse.yaml: tissue.material.young"),
                           ({"material": {"yuong": 1}}, "the nearest known one is 'young'"),
                           ({"moves": []}, "no member 'moves'"), ({"material": 3}, "tissue.material"),
                           ({"boundary": {"rim": None}}, "boundary has no value for 'rim'")):
         with pytest.raises(repose.Refused, match=re.escape(words)) as refusal:
-            session.change(**values)
+            coarse.change(**values)
         assert "\n" not in str(refusal.value)
-    assert distance(session.solve(A), changed) == 0, "a refused change leaves the scene as it was"
-    session.change()
-    assert distance(session.solve(A), before) < ROUNDING, "another session with the same values"
+    assert distance(coarse.solve(A), changed) == 0, "a refused change leaves the scene as it was"
+    coarse.change()
+    assert distance(coarse.solve(A), before) < ROUNDING, "another session with the same values"
 
 
 def test_a_later_solve_ends_the_one_under_way(session):
@@ -270,11 +288,9 @@ def test_faces_are_meshes_of_pyvista(session):
     assert np.allclose(mesh.point_data["displacement"], face.displacement)
 
 
-def talk(environment, lines, ranks=1):
+def talk(environment, lines, scene=SCENE):
     """Returns the answers of repose-live to these lines, and its status."""
-    command = [str(programs() / "repose-live"), str(SCENE)]
-    if ranks > 1:
-        command = ["mpirun", "-n", str(ranks), *command]
+    command = [str(programs() / "repose-live"), str(scene)]
     done = subprocess.run(command, input=lines, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
                           timeout=60, env={**os.environ, **environment})
     return done.returncode, done.stdout
@@ -288,12 +304,12 @@ def test_malformed_lines_and_the_end_of_the_input(environment):
     assert talk(environment, b"") == (0, b"")
 
 
-def test_a_solve_is_answered_after_the_end_of_the_input(environment):
+def test_a_solve_is_answered_after_the_end_of_the_input(environment, coarse_scene):
     solve = b'{"id": 1, "do": "solve", "plan": {"chin": {"translate": [0, -2, 0]}}}\n'
-    status, message = talk(environment, solve)
+    status, message = talk(environment, solve, coarse_scene)
     head = json.loads(message.partition(b"\n")[0])
     assert status == 0 and head["ok"] and head["converged"], head.get("error")
-    status, message = talk(environment, solve + b'{"id": 2, "do": "quit"}\n')
+    status, message = talk(environment, solve + b'{"id": 2, "do": "quit"}\n', coarse_scene)
     first, second = (json.loads(line) for line in message.splitlines())
     assert not first["ok"] and "a later request overtook it" in first["error"] and second["ok"]
 
@@ -336,11 +352,11 @@ def test_what_libraries_print_is_no_answer(session, tmp_path):
         assert [piece.name for piece in other.pieces] == [piece.name for piece in session.pieces]
 
 
-def test_two_ranks_give_the_same_face(session, environment):
-    with repose.Session(SCENE, ranks=2, program=programs() / "repose-live") as shared:
-        assert distance(shared.solve(A), session.solve(A)) < 0.1
-        mine, other = (one.solve(A, accuracy=0.001, tangents=True, gradient_of={700: [0, 1, 0]})
-                       for one in (shared, session))
+def test_two_ranks_give_the_same_face(coarse, coarse_scene):
+    with repose.Session(coarse_scene, ranks=2, program=programs() / "repose-live") as shared:
+        assert distance(shared.solve(A), coarse.solve(A)) < 0.1
+        mine, other = (one.solve(A, accuracy=0.001, tangents=True, gradient_of={552: [0, 1, 0]})
+                       for one in (shared, coarse))
         assert len(mine.tangent.columns) == 18
         assert np.allclose(mine.gradient.pieces["mandible"]["translate"],
                            other.gradient.pieces["mandible"]["translate"], atol=1e-3)
@@ -364,10 +380,10 @@ def test_a_scene_without_a_plan_is_refused(environment):
         repose.Session(PROJECT / "meshes/head_genioplasty.yaml", program=programs() / "repose-live")
 
 
-def test_the_client_of_the_guide_works(environment, tmp_path):
+def test_the_client_of_the_guide_works(environment, coarse_scene):
     page = (PROJECT / "docs/guide/live.md").read_text()
     client = re.findall(r"```python\n(import json.*?)```", page, re.S)[0]
-    message = subprocess.run([sys.executable, "-c", client, SCENE], text=True, check=True, timeout=60,
+    message = subprocess.run([sys.executable, "-c", client, coarse_scene], text=True, check=True, timeout=60,
                           stdout=subprocess.PIPE,
                           env={**os.environ, **environment,
                                "PATH": f"{programs()}:{os.environ['PATH']}"}).stdout
