@@ -65,6 +65,12 @@ def same_face(file, other, within):
     assert abs(one["objective"] / two["objective"] - 1) < 1e-12
 
 
+def sums(rows, values, count):
+    """The sums [count, 3] of values [..., 3] by row."""
+    return np.stack([np.bincount(rows.ravel(), values[..., axis].ravel(), count)
+                     for axis in range(3)], axis=1)
+
+
 def prism_volumes(x, prisms):
     """Volumes [M] and their gradients [M, 6, 3]."""
     a0, a1, a2, b0, b1, b2 = (x[prisms[:, corner]] for corner in range(6))
@@ -106,9 +112,7 @@ class Tissue:
         m, used = self.model, self.spring
         energy, tension, unit = self.springs(x)
         pull = (tension[:, None] * unit)[used]
-        elastic = -self.load.copy()
-        np.add.at(elastic, m["spring/points"][used, 0], -pull)
-        np.add.at(elastic, m["spring/points"][used, 1], pull)
+        elastic = sums(m["spring/points"][used], np.stack([-pull, pull], axis=1), len(x)) - self.load
         value = energy[used].sum()
         value -= (self.load * (x - m["point/position"]))[self.soft].sum()
         value, gradient = self.with_volume(x, value, elastic)
@@ -128,5 +132,4 @@ class Tissue:
             value = self.weight * value + (1 - self.weight) * ((v - v0)**2).sum()
             gradient = self.weight * gradient
             push = 2 * (1 - self.weight) * (v - v0)
-        np.add.at(gradient, corners, push[:, None, None] * slopes)
-        return value, gradient
+        return value, gradient + sums(corners, push[:, None, None] * slopes, len(x))
