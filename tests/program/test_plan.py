@@ -13,9 +13,10 @@ JAWS = "moves:\n  - {bone: mandible, translate: [0, -5, 0]}\n  - {bone: chin, tr
 
 @pytest.fixture
 def scene(tmp_path):
-    """scene(moves, plan) → a genioplasty with these moves."""
+    """scene(moves, plan) → a genioplasty of a coarse head with these moves."""
     text = (PROJECT / "meshes/head_genioplasty.yaml").read_text().split("moves:")[0]
     text = re.sub(r"head_(\w+)\.ply", rf"{PROJECT}/meshes/head_\1.ply", text)
+    text = text.replace("  layers: 4", "  layers: 3\n  edge: 8")
 
     def write(moves, plan=PLAN):
         path = tmp_path / "scene.yaml"

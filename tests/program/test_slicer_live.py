@@ -108,7 +108,7 @@ class Slicer:
 
 
 @pytest.fixture
-def started(environment, monkeypatch):
+def started(environment, monkeypatch, tmp_path):
     """(stand-in, widget of the module, status lines) after Start."""
     surroundings = {**os.environ, **environment}
     stand_in = Slicer(surroundings)
@@ -122,7 +122,9 @@ def started(environment, monkeypatch):
     widget, lines = module.ReposeLiveWidget(), []
     widget.setup()
     widget.tell = lines.append
-    widget.path = types.SimpleNamespace(text=str(PROJECT / "meshes/head_live.yaml"))
+    scene = (PROJECT / "meshes/head_live.yaml").read_text().replace(": head_", f": {PROJECT}/meshes/head_")
+    (tmp_path / "coarse.yaml").write_text(scene.replace("  layers: 4", "  layers: 3\n  edge: 8"))
+    widget.path = types.SimpleNamespace(text=str(tmp_path / "coarse.yaml"))
     widget.toggle()
     yield stand_in, widget, lines
     widget.stop()
