@@ -95,12 +95,15 @@ def test_a_run_that_ignores_hang_ups_goes_on(environment, tmp_path):
 
 @pytest.fixture
 def busy():
-    """Two processes that take what they get of the processors."""
+    """Two processes that take what they get of the processors; the function that ends them."""
     loops = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(2)]
-    yield
-    for loop in loops:
-        loop.kill()
-        loop.wait()
+
+    def end():
+        for loop in loops:
+            loop.kill()
+            loop.wait()
+    yield end
+    end()
 
 
 @pytest.mark.parametrize("lines", [1, *[pytest.param(lines, marks=pytest.mark.long)
@@ -111,6 +114,7 @@ def test_ctrl_c_at_mpirun_leaves_a_result_though_ranks_are_killed(run, environme
     iterations(process, lines)
     process.send_signal(signal.SIGINT)
     text, _ = process.communicate(timeout=TIME_LIMIT)
+    busy()
     assert process.returncode != 0
     step = last(tmp_path / "early.h5")
     assert step["converged"] == (step["load"] == 1)  # it may end before it is killed

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from conftest import PROJECT, RUNS_ALL, finish, programs
+from conftest import PROJECT, RUNS_ALL, finish, programs, runner
 from heads import DATA
 
 MESHES = PROJECT / "meshes"
@@ -44,17 +44,32 @@ def turned(folder, head, change, shift=lambda points: 0):
     return surfaces
 
 
+@pytest.fixture(scope="module")
+def upright(tmp_path_factory, environment):
+    """upright(head) → the landmarks of a head as it is given, which are searched once only."""
+    found = {}
+
+    def landmarks(head):
+        if head not in found:
+            folder = tmp_path_factory.mktemp("upright")
+            done = runner(folder, environment)("repose-landmarks", *turned(folder, head, np.eye(3)), "-output", "upright")
+            assert done.returncode == 0, done
+            found[head] = points(folder / "upright.mrk.json")
+        return found[head]
+
+    return landmarks
+
+
 @pytest.mark.parametrize("head", [f"{MESHES}/head_", pytest.param(
     f"{DATA}/", marks=pytest.mark.skipif(not DATA.is_dir(), reason=f"no real head: {DATA} is missing"))])
 @pytest.mark.parametrize("pitch, yaw, roll", [
     (-45, 0, 0), (30, -30, 0), *(pytest.param(*more, marks=pytest.mark.long) for more in ((45, 0, 0), (0, 30, -30)))])
-def test_a_turned_scan_has_the_same_landmarks(run, tmp_path, head, pitch, yaw, roll):
+def test_a_turned_scan_has_the_same_landmarks(run, tmp_path, upright, head, pitch, yaw, roll):
     turn = Rotation.from_euler("xyz", [pitch, roll, yaw], degrees=True).as_matrix()
-    for name, change in (("upright", np.eye(3)), ("turned", turn)):
-        assert run("repose-landmarks", *turned(tmp_path, head, change), "-output", name).returncode == 0
-    upright, found = (points(tmp_path / f"{name}.mrk.json") for name in ("upright", "turned"))
-    assert len(found) == len(upright) == 23
-    assert max(np.linalg.norm(turn.T @ place - upright[name]) for name, place in found.items()) < 0.5
+    assert run("repose-landmarks", *turned(tmp_path, head, turn), "-output", "turned").returncode == 0
+    given, found = upright(head), points(tmp_path / "turned.mrk.json")
+    assert len(found) == len(given) == 23
+    assert max(np.linalg.norm(turn.T @ place - given[name]) for name, place in found.items()) < 0.5
 
 
 @pytest.mark.skipif(not DATA.is_dir(), reason=f"no real head: {DATA} is missing")
@@ -70,11 +85,11 @@ def test_noise_moves_a_flat_nasion_little(run, tmp_path):
 
 @pytest.mark.parametrize("head", [f"{MESHES}/head_", pytest.param(
     f"{DATA}/", marks=pytest.mark.skipif(not DATA.is_dir(), reason=f"no real head: {DATA} is missing"))])
-def test_a_mirrored_head_has_mirrored_landmarks(run, tmp_path, head):
+def test_a_mirrored_head_has_mirrored_landmarks(run, tmp_path, upright, head):
     mirror = np.array([-1, 1, 1])
-    for name, change in (("given", np.eye(3)), ("mirrored", np.diag(mirror))):
-        assert run("repose-landmarks", *turned(tmp_path, head, change), "-output", name).returncode == 0
-    given, mirrored = (points(tmp_path / f"{name}.mrk.json") for name in ("given", "mirrored"))
+    surfaces = turned(tmp_path, head, np.diag(mirror))
+    assert run("repose-landmarks", *surfaces, "-output", "mirrored").returncode == 0
+    given, mirrored = upright(head), points(tmp_path / "mirrored.mrk.json")
     other = {"left": "right", "right": "left"}
     for name, place in given.items():
         twin = mirrored["_".join(other.get(word, word) for word in name.split("_"))]

@@ -175,11 +175,20 @@ def live():
 
 
 @pytest.fixture(scope="module")
-def served(live, environment):
+def scene(tmp_path_factory):
+    """The shipped scene of the plan with longer edges."""
+    text = re.sub(r"head_(\w+)\.ply", rf"{PROJECT}/meshes/head_\1.ply", SCENE.read_text())
+    file = tmp_path_factory.mktemp("coarse") / SCENE.name
+    file.write_text(text.replace("  layers: 4", "  layers: 3\n  edge: 6"))
+    return file
+
+
+@pytest.fixture(scope="module")
+def served(live, environment, scene):
     """A running server and its address."""
     os.environ.update(environment)
-    with repose.Session(SCENE, program=programs() / "repose-live") as session:
-        server, address = live.make_server(session, SCENE)
+    with repose.Session(scene, program=programs() / "repose-live") as session:
+        server, address = live.make_server(session, scene)
         thread = threading.Thread(target=server.serve_forever)
         thread.start()
         yield server, address
@@ -246,7 +255,7 @@ def test_a_saved_scene_is_the_plan(live, served, run, tmp_path):
     code, text = status(address, "/scene_file", {"X-Token": server.token},
                         json.dumps({"moves": {"chin": matrix}}).encode())
     scene = tmp_path / "plan.yaml"
-    scene.write_text(re.sub(r"head_(\w+)\.ply", rf"{PROJECT}/meshes/head_\1.ply", text.decode()))
+    scene.write_bytes(text)
     assert code == 200 and scene.read_text().count("moves:") == 1
     assert run("repose-solve", scene, "-dry_run").returncode == 0
 
@@ -254,7 +263,7 @@ def test_a_saved_scene_is_the_plan(live, served, run, tmp_path):
 def test_a_report_of_the_plan_is_written_beside_the_scene(served, tmp_path):
     server, address = served
     own, server.scene = server.scene, tmp_path / SCENE.name
-    server.scene.write_text(re.sub(r"head_(\w+)\.ply", rf"{PROJECT}/meshes/head_\1.ply", SCENE.read_text()))
+    server.scene.write_text(own.read_text())
     try:
         code, path = status(address, "/report", {"X-Token": server.token},
                             json.dumps({"plan": {"chin": {"translate": [0, -2, 0]}}}).encode())
@@ -270,7 +279,7 @@ def browsed(live, served, script, size):
     needs_browser()
     server, address = served
     script = f"<script>{HELPERS}{script}{TOLD}</script></body>"
-    server.page = live.page(SCENE).replace(b"</body>", script.encode())
+    server.page = live.page(server.scene).replace(b"</body>", script.encode())
     with tempfile.TemporaryDirectory() as profile:
         message = subprocess.run(
             [CHROMIUM, *[one for one in OPTIONS if "NOTFOUND" not in one],

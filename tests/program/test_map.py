@@ -22,10 +22,10 @@ SAMPLES = 9
 
 
 def one_piece(folder):
-    """The shipped head with a plan of its mandible alone, in a folder of its own."""
+    """The shipped head, coarser, with a plan of its mandible alone, in a folder of its own."""
     text = (PROJECT / "meshes/head_live.yaml").read_text()
     text = re.sub(r"head_(\w+)\.ply", rf"{PROJECT}/meshes/head_\1.ply", text)
-    text = re.sub(r"osteotomies:.*", "", text, flags=re.S).replace("layers: 4", "layers: 3")
+    text = re.sub(r"osteotomies:.*", "", text, flags=re.S).replace("layers: 4", "layers: 3\n  edge: 8")
     scene = folder / "one.yaml"
     scene.write_text(text + "moves:\n  - {bone: mandible, translate: [0, -2, 0]}\nplan:\n"
                      "  pieces: [mandible]\n  box: {translate: [0, 4, 2], rotate: [3, 0, 0]}\n")

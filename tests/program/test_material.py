@@ -109,12 +109,13 @@ def solve(run, tmp_path, name, text, *options, ranks=1, status=0):
 
 @pytest.mark.parametrize("moves, more, tissue", [
     *(pytest.param(move, "", "", marks=pytest.mark.long) for move in (JAW_FORWARD, JAW_OPENS)),
-    ("  - {bone: chin, translate: [0, -8, 0]}", CHIN, "  release: 5")])
+    ("  - {bone: chin, translate: [0, -8, 0]}", CHIN, "  release: 5\n  edge: 8")])
 def test_one_face_whatever_the_load_steps_and_the_ranks(run, tmp_path, moves, more, tissue):
     text, accuracy = scene(tissue, moves, more), 0.001
     options = "-accuracy", accuracy
     one = last(solve(run, tmp_path, "one", text, *options)[0])
     assert one["inverted_prisms"] == 0
+    assert one["point/contact_pressure"].max() > 0
     assert one["evaluations"] <= 120
     for steps_wanted in (2, 5, 10) if RUNS_ALL else (5,):
         other = solve(run, tmp_path, "other", text, *options, "-load_steps", steps_wanted)[0]
@@ -241,7 +242,7 @@ def test_isotropic_springs_have_the_solid_s_modulus_of_compression(run, tmp_path
 
 
 def test_mesh_and_layers_have_an_estimate_of_their_own(run, tmp_path):
-    file, report = solve(run, tmp_path, "coarse", scene(), "-discretisation")
+    file, report = solve(run, tmp_path, "coarse", scene("  edge: 7"), "-discretisation")
     assert "mesh and layers" in report and "order" in report
     step, model = last(file), model_of(file)
     error, layer = step["point/discretisation_error"], model["point/layer"]
@@ -250,7 +251,7 @@ def test_mesh_and_layers_have_an_estimate_of_their_own(run, tmp_path):
     assert np.isclose(error[moves].max(), step["discretisation_error"])
     assert all("point/discretisation_error" in s for s in steps(file))
     # The layers doubled, the face moves by about as much as the estimate says.
-    finer = scene().replace("layers: 4", "layers: 7")
+    finer = scene("  edge: 7").replace("layers: 4", "layers: 7")
     other = solve(run, tmp_path, "finer", finer, "-accuracy", 0.01)[0]
     skin = lambda f: last(f)["point/position"][model_of(f)["point/layer"] == 0]
     apart_at_skin = np.linalg.norm(skin(file) - skin(other), axis=1)
