@@ -127,12 +127,12 @@ def test_the_gradient_of_a_point_is_the_transpose_of_the_tangents(coarse):
     coarse.change()
 
 
-def test_refusals_name_the_place_and_the_session_goes_on(session):
+def test_refusals_name_the_place_and_the_session_goes_on(coarse):
     for plan, words in ((({"mandible": {"translate": [0, -9, 0]}}), "'mandible': translation -9 mm"),
                         (({"jaw": {}}), "'jaw' is no piece"),
                         (({"chin": {"turn": [0, 0, 1]}}), "no member 'turn'")):
         with pytest.raises(repose.Refused, match=re.escape(words)):
-            session.solve(plan)
+            coarse.solve(plan)
     for request in ({"do": "dance"}, {"do": "solve", "plan": 3}, {"do": "solve", "accuracy": -1},
                     {"do": "solve", "plan": {"chin": {"translate": [0, 1]}}}, {"do": "write"},
                     {"do": "solve", "tangents": "yes"}, {"do": "solve", "gradient_of": []},
@@ -142,9 +142,9 @@ def test_refusals_name_the_place_and_the_session_goes_on(session):
                     {"do": "solve", "gradient_of": [{"point": 1, "weight": [0, 0, -1e-300]}]},
                     {"do": "solve", "gradient_of": [{"point": 1}]}):
         with pytest.raises(repose.Refused) as refusal:
-            session.ask(request)
+            coarse.ask(request)
         assert "\n" not in str(refusal.value)
-    assert session.solve(B).converged
+    assert coarse.solve(B).converged
 
 
 def test_a_request_that_is_no_line_of_json_is_refused(session):

@@ -66,17 +66,20 @@ def test_ranks_make_the_parts_of_a_solid_that_one_rank_builds(solved, scene, ran
     assert apart(last(one), last(many)) < 0.1  # the accuracy
 
 
-def test_ranks_that_made_their_parts_measure_instruments_and_verify_the_path(run):
+def test_ranks_that_made_their_parts_measure_instruments_and_verify_the_path(run, tmp_path):
+    text = (PROJECT / "meshes/head_instrument.yaml").read_text()
+    text = text.replace(": head_", f": {PROJECT}/meshes/head_")
+    (tmp_path / "coarse.yaml").write_text(text.replace("  layers: 4", "  layers: 4\n  edge: 7", 1))
     rows = []
     for ranks in (1, 3):
-        result = run("repose-solve", PROJECT / "meshes/head_instrument.yaml", "-verify_path",
-                     ranks=ranks)
+        result = run("repose-solve", "coarse.yaml", "-verify_path", ranks=ranks)
         assert (result.returncode, result.stderr) == (0, ""), result
         assert ("by 3 ranks, each its part" in result.stdout) == (ranks == 3)
         assert "verified: in " in result.stdout
         rows.append(next(row for row in result.stdout.splitlines() if "instrument 0 " in row))
     forces = [[float(x) for x in re.findall(r"[-\d.e]+(?=[,)])", row)] for row in rows]
-    assert len(forces[0]) == 3 and forces[0] == pytest.approx(forces[1], abs=0.01)  # N
+    assert len(forces[0]) == 3 and max(map(abs, forces[0])) > 0.1
+    assert forces[0] == pytest.approx(forces[1], abs=0.01)  # N
 
 
 @pytest.mark.long
