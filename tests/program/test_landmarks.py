@@ -52,7 +52,8 @@ def upright(tmp_path_factory, environment):
     def landmarks(head):
         if head not in found:
             folder = tmp_path_factory.mktemp("upright")
-            done = runner(folder, environment)("repose-landmarks", *turned(folder, head, np.eye(3)), "-output", "upright")
+            surfaces = turned(folder, head, np.eye(3))
+            done = runner(folder, environment)("repose-landmarks", *surfaces, "-output", "upright")
             assert done.returncode == 0, done
             found[head] = points(folder / "upright.mrk.json")
         return found[head]
