@@ -165,7 +165,7 @@ void follow(Mover& a, Mover& b, const scene::Collision& requested, BonePair& pai
   }
   surface::Encounter encounter(fine ? fine->first : a.tree, fine ? fine->second : b.tree,
                                twist_of(a.motion), twist_of(b.motion), touching, inside);
-  pair.ignored = encounter.ignored_triangles();
+  pair.ignored = encounter.ignored_area();
   constexpr double caution = 1 - 1e-9;  // of a step: twists are rounded
   for (double load = 0; load <= 1;) {
     const auto next = encounter.next(relative(a.motion, b.motion, load), requested.clearance);
@@ -287,7 +287,7 @@ std::vector<std::string> describe(const CollisionReport& report, const scene::Sc
                           pair.crossings, pair.depth);
     if (pair.ignored > 0)
       line += fmt::format(
-          "; {} triangles that touch or overlap from the start (within {:g} mm) are not counted",
+          "; {:.0f} mm² of both that touch or overlap from the start (within {:g} mm) are left out",
           pair.ignored, requested.clearance + 2 * requested.tolerance);
     lines.push_back(line);
   }

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <functional>
 #include <sstream>
+#include <utility>
 
 #include "cgal.h"
 #include "repose/base/error.h"
@@ -96,11 +97,19 @@ std::string plain_stl(const Content& content) {
   });
 }
 
-/// Vertices and faces only, words separated by one blank.
+/// Vertices and faces only, words separated by one blank; a line that goes on in the next is
+/// joined with it.
 std::string plain_obj(const Content& content) {
-  return rewrite_lines(content.bytes, [&](std::string_view line, int64_t number) {
-    const auto found = base::words(line.substr(0, line.find('#')));
+  std::string joined;
+  const auto rewrite = [&](std::string_view line, int64_t number) {
     std::string plain;
+    joined += line.substr(0, line.find('#'));
+    if (joined.ends_with('\\')) {
+      joined.back() = ' ';
+      return plain;
+    }
+    const std::string whole = std::exchange(joined, {});
+    const auto found = base::words(whole);
     if (found.empty() || (found[0] != "v" && found[0] != "f")) return plain;
     if (found[0] == "v") check_point(found, content.file.string(), number);
     for (const auto& word : found) {
@@ -108,7 +117,11 @@ std::string plain_obj(const Content& content) {
       plain += ' ';
     }
     return plain;
-  });
+  };
+  std::string text = rewrite_lines(content.bytes, rewrite);
+  if (!joined.empty())
+    base::refuse("{}: truncated: its last line goes on; export it again", content.file.string());
+  return text;
 }
 
 }  // namespace

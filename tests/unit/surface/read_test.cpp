@@ -107,6 +107,13 @@ TEST_F(Read, polygons_become_triangles_of_the_same_area) {
       2u);
 }
 
+TEST_F(Read, lines_of_an_obj_go_on_behind_a_backslash) {
+  const std::string points = "v 0 0 0\nv 20 0 \\\n0\nv 20 20 0\n# no end \\\nv 0 20 0\n";
+  EXPECT_EQ(read_surface(write("square.obj", points + "f 1 2\\\r\n 3 4\n")).triangles.size(), 2u);
+  EXPECT_NE(refused("part.obj", points + "f 1 2 3\\\n").find("part.obj: truncated"),
+            std::string::npos);
+}
+
 TEST_F(Read, stl_in_capitals_with_keywords_as_name) {
   std::string text = with(stl_text(cube()), "solid by hand", "solid facet solid");
   for (char& c : text) c = static_cast<char>(std::toupper(c));
