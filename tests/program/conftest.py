@@ -22,6 +22,12 @@ def mpi_environment():
     return dict(entry.split("=", 1) for entry in text.split("\0") if entry)
 
 
+def shipped(name, layers=4, edge=None):
+    """The text of a shipped scene of the synthetic head, for any folder; with `edge` its skin is remeshed, mm."""
+    text = (PROJECT / "meshes" / name).read_text().replace(": head_", f": {PROJECT}/meshes/head_")
+    return text.replace("  layers: 4", f"  layers: {layers}" + (f"\n  edge: {edge}" if edge else ""), 1)
+
+
 def programs():
     """The folder of the built programs (REPOSE_BIN, which ctest sets)."""
     if "REPOSE_BIN" not in os.environ:

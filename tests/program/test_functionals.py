@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.sparse.linalg import LinearOperator, eigsh
 
-from conftest import PROJECT
+from conftest import PROJECT, shipped
 from heads import box, write
 from tissue import Tissue, apart, last, model_of, steps
 
@@ -52,9 +52,7 @@ def test_force_and_energy_meet(solved, small, scene, weight):
 @pytest.mark.long
 def test_force_and_energy_meet_after_the_whole_move_of_the_finer_head(solved, tmp_path):
     """With weight and without volume term; the opening has many minima there, the advance one."""
-    text = (PROJECT / "meshes/head_springs_advance.yaml").read_text()
-    text = text.replace(": head_", f": {PROJECT}/meshes/head_")
-    text = text.replace("  layers: 4 ", "  density: 1.0e-6\n  layers: 4 ")
+    text = shipped("head_springs_advance.yaml").replace("  layers: 4 ", "  density: 1.0e-6\n  layers: 4 ")
     scene = tmp_path / "advance.yaml"
     scene.write_text(text + "gravity: [0, 0, -9.80665]\n")
     accuracy = 1e-4

@@ -4,7 +4,7 @@ import meshio
 import numpy as np
 import pytest
 
-from conftest import PROJECT
+from conftest import PROJECT, shipped
 from heads import read_vtp
 from tissue import apart, last, model_of, same_face
 
@@ -137,9 +137,7 @@ def rim_path(folder):
 @pytest.mark.parametrize("ranks", [1, 2])
 def test_the_given_skin_parts_with_the_lips(run, tmp_path, ranks):
     """Remeshed and solved with parted lips; the given one goes along, each side with its own lip."""
-    text = (PROJECT / "meshes/head_jaw_opening.yaml").read_text()
-    text = text.replace(": head_", f": {PROJECT}/meshes/head_")
-    text = text.replace("  layers: 4", "  layers: 3\n  edge: 8", 1)
+    text = shipped("head_jaw_opening.yaml", layers=3, edge=8)
     text += "mouth: {path: [[-20, -92, -35], [0, -98, -35], [20, -92, -35]]}\n"
     file = cut(run, tmp_path, scene=text, ranks=ranks, accuracy=0.1)
     model, step = model_of(file), last(file)

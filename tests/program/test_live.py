@@ -12,7 +12,7 @@ import time
 import h5py
 import numpy as np
 import pytest
-from conftest import PROJECT, programs
+from conftest import PROJECT, programs, shipped
 
 sys.path.insert(0, str(PROJECT / "drivers/python"))
 import repose  # noqa: E402
@@ -34,8 +34,7 @@ def session(environment):
 def coarse_scene(tmp_path_factory):
     """The scene with longer edges and fewer layers."""
     file = tmp_path_factory.mktemp("coarse") / "coarse.yaml"
-    text = SCENE.read_text().replace(": head_", f": {SCENE.parent}/head_")
-    file.write_text(text.replace("  layers: 4", "  layers: 3\n  edge: 8"))
+    file.write_text(shipped(SCENE.name, layers=3, edge=8))
     return file
 
 
@@ -270,8 +269,7 @@ def test_a_plan_is_written_whatever_was_solved_last(session, tmp_path):
 
 
 def test_a_full_result_holds_the_given_skin(tmp_path):
-    text = SCENE.read_text().replace(": head_", f": {SCENE.parent}/head_").replace("  layers: 4", "  layers: 2\n  edge: 8")
-    (tmp_path / "plan.yaml").write_text(text)
+    (tmp_path / "plan.yaml").write_text(shipped(SCENE.name, layers=2, edge=8))
     with repose.Session(tmp_path / "plan.yaml", program=programs() / "repose-live") as coarse:
         coarse.solve(B, accuracy=1)
         coarse.write(tmp_path / "plan")
@@ -365,8 +363,7 @@ def test_two_ranks_give_the_same_face(coarse, coarse_scene):
 
 def test_the_skin_that_a_scene_names_follows_the_one_that_is_solved(environment, tmp_path):
     scene = tmp_path / "remeshed.yaml"
-    text = re.sub(r"head_(\w+)\.ply", rf"{PROJECT}/meshes/head_\1.ply", SCENE.read_text())
-    scene.write_text(text.replace("layers: 4", "layers: 3\n  edge: 8"))
+    scene.write_text(shipped(SCENE.name, layers=3, edge=8))
     with repose.Session(scene, program=programs() / "repose-live") as remeshed:
         face = remeshed.solve(remeshed.scene_plan)
         given = np.linalg.norm(face.given_position - remeshed.given.position, axis=1)

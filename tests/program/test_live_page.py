@@ -16,7 +16,7 @@ import meshio
 import numpy as np
 import pytest
 from browser import CHROMIUM, FOUND, OPTIONS, needs_browser
-from conftest import PROJECT, programs
+from conftest import PROJECT, programs, shipped
 from scipy.spatial.transform import Rotation
 
 sys.path.insert(0, str(PROJECT / "drivers/python"))
@@ -177,9 +177,8 @@ def live():
 @pytest.fixture(scope="module")
 def scene(tmp_path_factory):
     """The shipped scene of the plan with longer edges."""
-    text = re.sub(r"head_(\w+)\.ply", rf"{PROJECT}/meshes/head_\1.ply", SCENE.read_text())
     file = tmp_path_factory.mktemp("coarse") / SCENE.name
-    file.write_text(text.replace("  layers: 4", "  layers: 3\n  edge: 6"))
+    file.write_text(shipped(SCENE.name, layers=3, edge=6))
     return file
 
 

@@ -7,7 +7,7 @@ import sys
 import numpy as np
 import pytest
 from browser import evaluate
-from conftest import PROJECT, finish, programs
+from conftest import PROJECT, finish, programs, shipped
 
 sys.path[:0] = [str(PROJECT / "drivers/python"), str(PROJECT / "drivers")]
 pytest.importorskip("scipy")
@@ -23,9 +23,7 @@ SAMPLES = 9
 
 def one_piece(folder):
     """The shipped head, coarser, with a plan of its mandible alone, in a folder of its own."""
-    text = (PROJECT / "meshes/head_live.yaml").read_text()
-    text = re.sub(r"head_(\w+)\.ply", rf"{PROJECT}/meshes/head_\1.ply", text)
-    text = re.sub(r"osteotomies:.*", "", text, flags=re.S).replace("layers: 4", "layers: 3\n  edge: 8")
+    text = re.sub(r"osteotomies:.*", "", shipped("head_live.yaml", layers=3, edge=8), flags=re.S)
     scene = folder / "one.yaml"
     scene.write_text(text + "moves:\n  - {bone: mandible, translate: [0, -2, 0]}\nplan:\n"
                      "  pieces: [mandible]\n  box: {translate: [0, 4, 2], rotate: [3, 0, 0]}\n")

@@ -5,7 +5,7 @@ import re
 import h5py
 import numpy as np
 import pytest
-from conftest import PROJECT
+from conftest import PROJECT, shipped
 
 PLAN = "plan:\n  pieces: [mandible, chin]\n  box: {translate: [0, 8, 0], rotate: [2, 0, 0]}\n"
 JAWS = "moves:\n  - {bone: mandible, translate: [0, -5, 0]}\n  - {bone: chin, translate: [0, %g, 0]}\n"
@@ -14,9 +14,7 @@ JAWS = "moves:\n  - {bone: mandible, translate: [0, -5, 0]}\n  - {bone: chin, tr
 @pytest.fixture
 def scene(tmp_path):
     """scene(moves, plan) → a genioplasty of a coarse head with these moves."""
-    text = (PROJECT / "meshes/head_genioplasty.yaml").read_text().split("moves:")[0]
-    text = re.sub(r"head_(\w+)\.ply", rf"{PROJECT}/meshes/head_\1.ply", text)
-    text = text.replace("  layers: 4", "  layers: 3\n  edge: 8")
+    text = shipped("head_genioplasty.yaml", layers=3, edge=8).split("moves:")[0]
 
     def write(moves, plan=PLAN):
         path = tmp_path / "scene.yaml"

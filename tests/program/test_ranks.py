@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 
-from conftest import PROJECT, RUNS_ALL
+from conftest import PROJECT, RUNS_ALL, shipped
 from heads import read_vtp
 from tissue import apart, last, model_of, steps
 
@@ -67,9 +67,7 @@ def test_ranks_make_the_parts_of_a_solid_that_one_rank_builds(solved, scene, ran
 
 
 def test_ranks_that_made_their_parts_measure_instruments_and_verify_the_path(run, tmp_path):
-    text = (PROJECT / "meshes/head_instrument.yaml").read_text()
-    text = text.replace(": head_", f": {PROJECT}/meshes/head_")
-    (tmp_path / "coarse.yaml").write_text(text.replace("  layers: 4", "  layers: 4\n  edge: 7", 1))
+    (tmp_path / "coarse.yaml").write_text(shipped("head_instrument.yaml", edge=7))
     rows = []
     for ranks in (1, 3):
         result = run("repose-solve", "coarse.yaml", "-verify_path", ranks=ranks)
@@ -84,9 +82,7 @@ def test_ranks_that_made_their_parts_measure_instruments_and_verify_the_path(run
 
 @pytest.mark.long
 def test_a_skin_that_was_solved_in_place_of_the_given_one(run, tmp_path):
-    text = (PROJECT / "meshes/head_solid.yaml").read_text()
-    text = text.replace(": head_", f": {PROJECT}/meshes/head_")
-    (tmp_path / "solid.yaml").write_text(text.replace("  layers: 4", "  layers: 4\n  edge: 8", 1))
+    (tmp_path / "solid.yaml").write_text(shipped("head_solid.yaml", edge=8))
     found = []
     for ranks in (1, 2):
         result = run("repose-solve", "solid.yaml", "-output", f"on{ranks}", ranks=ranks)
@@ -108,10 +104,7 @@ LIPS = "mouth: {path: [[45, -67, -31], [45, -75, -14], [45, -81, 1]]}\n"
 
 @pytest.mark.parametrize("ranks", [1, 2, 3])
 def test_a_remeshed_skin_with_parted_lips_ends_on_any_ranks(run, tmp_path, ranks):
-    text = (PROJECT / "meshes/head_jaw_opening.yaml").read_text()
-    text = text.replace(": head_", f": {PROJECT}/meshes/head_")
-    text = text.replace("  layers: 4", "  layers: 4\n  edge: 8", 1) + LIPS
-    (tmp_path / "lips.yaml").write_text(text)
+    (tmp_path / "lips.yaml").write_text(shipped("head_jaw_opening.yaml", edge=8) + LIPS)
     result = run("repose-solve", "lips.yaml", ranks=ranks)
     assert (result.returncode, result.stderr) == (0, ""), result
     assert "incision               along" in result.stdout
@@ -122,10 +115,7 @@ CHEEK = "incisions:\n  - {path: [[-45, -67, -31], [-45, -75, -14], [-45, -81, 1]
 
 
 def test_ranks_make_the_parts_of_a_solid_with_cuts(run, tmp_path):
-    text = (PROJECT / "meshes/head_jaw_opening.yaml").read_text()
-    text = text.replace(": head_", f": {PROJECT}/meshes/head_") + LIPS + CHEEK
-    text = text.replace("  layers: 4", "  layers: 3\n  edge: 8", 1)
-    (tmp_path / "cuts.yaml").write_text(text)
+    (tmp_path / "cuts.yaml").write_text(shipped("head_jaw_opening.yaml", layers=3, edge=8) + LIPS + CHEEK)
     models, rests = [], []
     for ranks in (1, 2, 3, 5) if RUNS_ALL else (1, 3, 5):
         result = run("repose-solve", "cuts.yaml", "-output", f"on{ranks}", ranks=ranks)
@@ -189,9 +179,7 @@ def test_same_face_with_weight_turgor_and_forces(solved, tmp_path, volume):
 
 @pytest.mark.parametrize("ranks", [2, *(pytest.param(ranks, marks=pytest.mark.long) for ranks in (3, 5))])
 def test_a_run_on_ranks_repeats_bit_by_bit(run, tmp_path, ranks):
-    text = (PROJECT / "meshes/head_jaw_advance.yaml").read_text()
-    text = text.replace(": head_", f": {PROJECT}/meshes/head_")
-    (tmp_path / "coarse.yaml").write_text(text.replace("  layers: 4", "  layers: 3\n  edge: 8", 1))
+    (tmp_path / "coarse.yaml").write_text(shipped("head_jaw_advance.yaml", layers=3, edge=8))
     positions = set()
     for _ in range(3):
         result = run("repose-solve", "coarse.yaml", "-accuracy", 1, "-output", "again", ranks=ranks)

@@ -9,7 +9,7 @@ import sys
 
 import pytest
 
-from conftest import PROJECT, TIME_LIMIT, can_draw, finish
+from conftest import PROJECT, TIME_LIMIT, can_draw, finish, shipped
 
 SCRIPT = PROJECT / "drivers/render.py"
 
@@ -181,9 +181,7 @@ def test_profiles_look_to_the_right(solved, monkeypatch):
 
 def test_the_given_skin_is_drawn_and_opens_at_the_lips(run, tmp_path, monkeypatch):
     drawing = drawing_module(monkeypatch)
-    text = (PROJECT / "meshes/head_incision.yaml").read_text()
-    text = text.replace(": head_", f": {PROJECT}/meshes/head_")
-    (tmp_path / "cut.yaml").write_text(text.replace("  layers: 4", "  layers: 2\n  edge: 8", 1))
+    (tmp_path / "cut.yaml").write_text(shipped("head_incision.yaml", layers=2, edge=8))
     assert run("repose-solve", "cut.yaml", "-accuracy", 1, "-allow_folded").returncode == 0
     given, solved = (drawing.Result(str(tmp_path / "cut.h5"), only) for only in (False, True))
     assert len(given.before) > 1.5 * len(solved.before)

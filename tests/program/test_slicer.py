@@ -15,7 +15,7 @@ import h5py
 import numpy as np
 import pytest
 
-from conftest import PROJECT, TIME_LIMIT, finish, programs
+from conftest import PROJECT, TIME_LIMIT, finish, programs, shipped
 from tissue import last, model_of
 
 PANEL = PROJECT / "drivers/slicer/Repose"
@@ -544,8 +544,7 @@ def test_several_processors(panel, head, tmp_path):
 
 def test_the_given_model_comes_back_displaced(program, run, tmp_path):
     """Where a remeshed part of the skin was solved, all of the chosen model is returned."""
-    text = (MESHES / "head_jaw_opening.yaml").read_text().replace(": head_", f": {MESHES}/head_")
-    (tmp_path / "part.yaml").write_text(text.replace("  layers: 4", "  layers: 2\n  edge: 8", 1))
+    (tmp_path / "part.yaml").write_text(shipped("head_jaw_opening.yaml", layers=2, edge=8))
     assert run("repose-solve", "part.yaml", "-accuracy", 1).returncode == 0
     with h5py.File(tmp_path / "part.h5") as h5:
         points, triangles, arrays = program["skin_to_hand_back"](h5, tmp_path / "part.h5")

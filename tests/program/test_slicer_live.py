@@ -10,7 +10,7 @@ from unittest.mock import MagicMock
 
 import numpy as np
 import pytest
-from conftest import PROJECT, programs
+from conftest import PROJECT, programs, shipped
 
 sys.path.insert(0, str(PROJECT / "drivers/python"))
 import repose  # noqa: E402
@@ -122,8 +122,7 @@ def started(environment, monkeypatch, tmp_path):
     widget, lines = module.ReposeLiveWidget(), []
     widget.setup()
     widget.tell = lines.append
-    scene = (PROJECT / "meshes/head_live.yaml").read_text().replace(": head_", f": {PROJECT}/meshes/head_")
-    (tmp_path / "coarse.yaml").write_text(scene.replace("  layers: 4", "  layers: 3\n  edge: 8"))
+    (tmp_path / "coarse.yaml").write_text(shipped("head_live.yaml", layers=3, edge=8))
     widget.path = types.SimpleNamespace(text=str(tmp_path / "coarse.yaml"))
     widget.toggle()
     yield stand_in, widget, lines

@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from conftest import PROJECT
+from conftest import PROJECT, shipped
 from tissue import apart, last, same_face, steps
 
 ACCURACY = 1e-6  # mm; two answers this near to the truth are twice as far apart at most
@@ -139,8 +139,7 @@ def test_petscs_log_tells_where_the_time_goes(run, tmp_path):
 def coarse(tmp_path):
     """coarse(name) → a shipped scene with longer edges."""
     def write(name):
-        text = (PROJECT / "meshes" / name).read_text().replace(": head_", f": {PROJECT}/meshes/head_")
-        (tmp_path / name).write_text(text.replace("  layers: 4", "  layers: 4\n  edge: 8"))
+        (tmp_path / name).write_text(shipped(name, edge=8))
         return tmp_path / name
 
     return write
@@ -162,8 +161,7 @@ def test_linear_systems_are_solved_as_far_as_requested(run, coarse):
     """Beyond what the program requires: a larger tolerance would bound no error."""
     iterations, scene = [], coarse("head_springs_genioplasty.yaml")
     for tolerance in (1, 1e-8):
-        result = run("repose-solve", scene, "-ksp_rtol", tolerance,
-                     "-ksp_converged_reason")
+        result = run("repose-solve", scene, "-ksp_rtol", tolerance, "-ksp_converged_reason")
         assert (result.returncode, result.stderr) == (0, ""), result
         iterations.append(sum(map(int, re.findall(r"due to CONVERGED_RTOL iterations (\d+)", result.stdout))))
     assert iterations[1] > 3 * iterations[0] > 0
