@@ -514,8 +514,7 @@ class Sheet:
         self.window.AddRenderer(scene)
 
     def pixels(self):
-        """[height, width, 3]"""
-        self.window.Render()
+        """[height, width, 3]; the filter renders."""
         image = vtk.vtkWindowToImageFilter()
         image.SetInput(self.window)
         image.ReadFrontBufferOff()
@@ -591,8 +590,9 @@ def picture(drawn, views, tables, title=""):
     for i, panel in enumerate(drawn):
         top = TITLE * (1 + bool(title))
         sheet.put(label(panel.title), i * wide, top - TITLE, wide, TITLE)
+        seen = actors(panel.column, panel.state, panel.result, tables)
         for view, (middle, _, up), high in zip(views, frames, rows):
-            scene = renderer(actors(panel.column, panel.state, panel.result, tables))
+            scene = renderer(seen)
             sheet.put(scene, i * wide, top, wide, high)
             look(scene, view, middle, margin * up)
             top += high
