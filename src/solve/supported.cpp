@@ -91,7 +91,7 @@ const std::vector<SupportedNumbers>& supported_numbers() {
       {{"tao_ls_ftol", "tao_ls_gtol", "tao_ls_rtol", "tao_ls_stepmin"}, Range::at_least(0)},
       {{"tao_ls_stepmax"}, Range::above(0)},
       {{"tao_ls_max_funcs"}, Range::at_least(1), true},
-      {{"ksp_rtol", "tao_*_ksp_rtol"}, {.min = 0, .max = 1, .min_excluded = true}},
+      {{"ksp_rtol", "tao_*_ksp_rtol"}, {.min = 0, .max = 0.9, .min_excluded = true}},
       {{"tao_*_ksp_atol"}, Range::at_least(0)},
       {{"ksp_divtol", "tao_*_ksp_divtol"}, Range::above(1)},
       {{"ksp_max_it", "tao_*_ksp_max_it"}, Range::at_least(1), true},

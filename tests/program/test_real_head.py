@@ -17,12 +17,11 @@ pytestmark = pytest.mark.skipif(not DATA.is_dir(), reason=f"no real head: {DATA}
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """The scene, with longer edges, and the surfaces it names."""
+    """The scene and the surfaces it names."""
     top = tmp_path_factory.mktemp("real_head")
     for name in ("skin.ply", "skull.ply", "mandible.ply"):
         (top / name).symlink_to(DATA / name)
-    text = (PROJECT / "meshes/real_head_springs.yaml").read_text()
-    (top / "scene.yaml").write_text(text.replace("  edge: 4", "  edge: 5"))
+    (top / "scene.yaml").symlink_to(PROJECT / "meshes/real_head_springs.yaml")
     return top
 
 

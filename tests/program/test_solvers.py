@@ -160,7 +160,7 @@ def test_the_preconditioner_alone_takes_conjugate_gradients_for_contact(run, coa
 def test_linear_systems_are_solved_as_far_as_requested(run, coarse):
     """Beyond what the program requires: a larger tolerance would bound no error."""
     iterations, scene = [], coarse("head_springs_genioplasty.yaml")
-    for tolerance in (1, 1e-8):
+    for tolerance in (0.9, 1e-8):
         result = run("repose-solve", scene, "-ksp_rtol", tolerance, "-ksp_converged_reason")
         assert (result.returncode, result.stderr) == (0, ""), result
         iterations.append(sum(map(int, re.findall(r"due to CONVERGED_RTOL iterations (\d+)", result.stdout))))

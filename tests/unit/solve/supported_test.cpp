@@ -100,8 +100,8 @@ TEST(SupportedNumbers, ValuesOutOfRangeAreRefusedWithTheRange) {
     EXPECT_EQ(refusal_of("-tao_gatol", value),
               fmt::format("-tao_gatol {}: must be a number, ≥ 0", value));
   EXPECT_EQ(refusal_of("-tao_gatol", ""), "-tao_gatol (no value): must be a number, ≥ 0");
-  EXPECT_EQ(refusal_of("-tao_ntr_ksp_rtol", "1.5"),
-            "-tao_ntr_ksp_rtol 1.5: must be a number, > 0 and ≤ 1");
+  EXPECT_EQ(refusal_of("-tao_ntr_ksp_rtol", "1"),
+            "-tao_ntr_ksp_rtol 1: must be a number, > 0 and ≤ 0.9");
   EXPECT_EQ(refusal_of("-ksp_divtol", "1"), "-ksp_divtol 1: must be a number, > 1");
   EXPECT_EQ(refusal_of("-tao_max_it", "2.5"), "-tao_max_it 2.5: must be a whole number, ≥ -1");
   for (const char* value : {"0", "1e-3", ".5"})
