@@ -287,7 +287,8 @@ std::vector<std::string> describe(const CollisionReport& report, const scene::Sc
                           pair.crossings, pair.depth);
     if (pair.ignored > 0)
       line += fmt::format(
-          "; {:.0f} mm² of both that touch or overlap from the start (within {:g} mm) are left out",
+          "; {:.1f} mm² of their surfaces touch or overlap from the start (within {:g} mm) and are "
+          "left out",
           pair.ignored, requested.clearance + 2 * requested.tolerance);
     lines.push_back(line);
   }

@@ -13,7 +13,7 @@ namespace repose::model {
 struct BonePair {
   int32_t a, b;            ///< rows of the scene's bones
   double gap;              ///< between them before all moves, −depth where they overlap
-  double ignored = 0;      ///< mm² of both that touch from the start and are not followed
+  double ignored = 0;      ///< mm² of their surfaces that touch from the start and are left out
   double load = 2;         ///< of first contact, 0 … 1; greater: none
   Vec3 at = Vec3::Zero();  ///< where, at that load
   int64_t crossings = 0;   ///< pairs of triangles that intersect at the end of the moves
