@@ -209,15 +209,6 @@ Encounter::Side Encounter::make_side(const CollisionTree& tree, const Twist& twi
   return side;
 }
 
-double Encounter::area_of_ignored(const Side& side) {
-  double twice = 0;
-  for (int64_t t = 0; t < side.tree->triangles(); ++t) {
-    const auto& [a, b, c] = side.tree->corners(t);
-    if (side.ignored[t]) twice += (b - a).cross(c - a).norm();
-  }
-  return twice / 2;
-}
-
 void Encounter::summarize(Side& side) {
   const auto& nodes = side.tree->nodes();
   side.only_such.assign(nodes.size(), 0);
@@ -235,9 +226,18 @@ Encounter::Encounter(const CollisionTree& a, const CollisionTree& b, const Twist
   if (!inside[1].empty()) b_.ignored = inside[1];
   for (const auto& [s, t] : pairs_within(a, b, Mat4::Identity(), touching))
     a_.ignored[s] = b_.ignored[t] = 1;
-  ignored_area_ = area_of_ignored(a_) + area_of_ignored(b_);
   summarize(a_);
   summarize(b_);
+}
+
+double Encounter::ignored_area() const {
+  double twice = 0;
+  for (const Side* side : {&a_, &b_})
+    for (int64_t t = 0; t < side->tree->triangles(); ++t) {
+      const auto& [a, b, c] = side->tree->corners(t);
+      if (side->ignored[t]) twice += (b - a).cross(c - a).norm();
+    }
+  return twice / 2;
 }
 
 Encounter::Next Encounter::next(const Mat4& pose, double clearance) {

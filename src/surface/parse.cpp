@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <functional>
 #include <sstream>
-#include <utility>
 
 #include "cgal.h"
 #include "repose/base/error.h"
@@ -97,30 +96,34 @@ std::string plain_stl(const Content& content) {
   });
 }
 
-/// Vertices and faces only, words separated by one blank; a line that goes on in the next is
-/// joined with it.
+/// A vertex or face, its words separated by one blank; empty where a line holds neither.
+std::string plain_obj_line(std::string_view line, const std::string& file, int64_t number) {
+  const auto found = base::words(line);
+  std::string plain;
+  if (found.empty() || (found[0] != "v" && found[0] != "f")) return plain;
+  if (found[0] == "v") check_point(found, file, number);
+  for (const auto& word : found) {
+    plain += word;
+    plain += ' ';
+  }
+  return plain;
+}
+
+/// Vertices and faces only; a line that goes on in the next is joined with it.
 std::string plain_obj(const Content& content) {
+  const std::string file = content.file.string();
   std::string joined;
-  const auto rewrite = [&](std::string_view line, int64_t number) {
-    std::string plain;
+  std::string text = rewrite_lines(content.bytes, [&](std::string_view line, int64_t number) {
     joined += line.substr(0, line.find('#'));
     if (joined.ends_with('\\')) {
       joined.back() = ' ';
-      return plain;
+      return std::string();
     }
-    const std::string whole = std::exchange(joined, {});
-    const auto found = base::words(whole);
-    if (found.empty() || (found[0] != "v" && found[0] != "f")) return plain;
-    if (found[0] == "v") check_point(found, content.file.string(), number);
-    for (const auto& word : found) {
-      plain += word;
-      plain += ' ';
-    }
+    std::string plain = plain_obj_line(joined, file, number);
+    joined.clear();
     return plain;
-  };
-  std::string text = rewrite_lines(content.bytes, rewrite);
-  if (!joined.empty())
-    base::refuse("{}: truncated: its last line goes on; export it again", content.file.string());
+  });
+  if (!joined.empty()) base::refuse("{}: truncated: its last line goes on; export it again", file);
   return text;
 }
 

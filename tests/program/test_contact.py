@@ -6,7 +6,7 @@ import h5py
 import numpy as np
 import pytest
 
-from conftest import PROJECT, runner, some_on_ranks
+from conftest import PROJECT, runner, shipped, some_on_ranks
 from heads import write
 from tissue import last, model_of
 
@@ -99,8 +99,7 @@ def test_a_restart_that_refines_a_result_stays_at_its_rest_position(folder, envi
 
 def test_requested_load_steps_change_no_bit_of_the_face(folder, environment):
     run = runner(folder, environment)
-    text = (folder / "head_le_fort.yaml").read_text()
-    (folder / "coarse_le_fort.yaml").write_text(text.replace("  layers: 4", "  layers: 4\n  edge: 7"))
+    (folder / "coarse_le_fort.yaml").write_text(shipped("head_le_fort.yaml", edge=7))
     faces = []
     for name, options in (("automatic", ()), ("requested", ("-load_steps", 3))):
         done = run("repose-solve", "coarse_le_fort.yaml", "-output", name, *options)

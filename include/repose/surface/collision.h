@@ -82,7 +82,7 @@ class Encounter {
             const Twist& twist_b, double touching,
             const std::array<std::vector<char>, 2>& inside = {});
 
-  double ignored_area() const { return ignored_area_; }  ///< mm², of both surfaces
+  double ignored_area() const;  ///< mm², of both surfaces
 
   struct Next {
     double load;  ///< that may pass until some pair could be within `clearance`; infinite
@@ -99,11 +99,9 @@ class Encounter {
     std::vector<char> only_such;  // [nodes] all triangles below are ignored
   };
   static Side make_side(const CollisionTree& tree, const Twist& twist);
-  static double area_of_ignored(const Side& side);
   static void summarize(Side& side);
 
   Side a_, b_;
-  double ignored_area_ = 0;
   std::array<int64_t, 2> last_{-1, -1};  // the leaves that bounded the last question
 };
 
