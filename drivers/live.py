@@ -6,13 +6,12 @@ derivatives, and exactly a moment later (docs/guide/live.md).
     drivers/live.py meshes/head_live.yaml -ranks 2 -port 8123 -no_browser
 
 Starts repose-live and a server for this machine alone (127.0.0.1); its address holds a token,
-without which nothing is answered. Ends with Ctrl-C. Needs NumPy and a browser with WebGL 2."""
+without which nothing is answered. Ends with Ctrl-C. Needs NumPy, PyYAML and a browser with WebGL 2."""
 
 import hmac
 import http.server
 import json
 import pathlib
-import re
 import secrets
 import signal
 import subprocess
@@ -24,7 +23,8 @@ import webbrowser
 
 HERE = pathlib.Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE / "python"), str(HERE)]
-from sheet.script import Arguments, number_from, refuse, refuse_missing, run  # noqa: E402
+from sheet.scene import named_file, with_moves  # noqa: E402
+from sheet.script import Arguments, Unusable, number_from, refuse, refuse_missing, run  # noqa: E402
 
 PAGE = """<!doctype html>
 <html lang="en"><head><meta charset="utf-8">
@@ -54,20 +54,6 @@ def packed(head, arrays):
                                                         for values in arrays.values())
 
 
-def scene_with_moves(path, moves):
-    """The text of the scene with these moves (piece, 4×4 matrix) in place of its own."""
-    kept, inside = [], False
-    for line in path.read_text(encoding="utf-8-sig").splitlines():
-        if re.match(r"[^\s#]", line):
-            inside = line.startswith("moves:")
-        if not inside:
-            kept.append(line)
-    rows = [f"  - {{bone: {json.dumps(piece)}, transform: {json.dumps(matrix)}}}"
-            for piece, matrix in moves.items()]
-    return "\n".join([f"# The plan of {path.name} as of drivers/live.py; belongs in its folder.",
-                      *kept, "moves:", *rows]) + "\n"
-
-
 class ProfileAngles:
     """Angles of the profile along the axes of the head, by the scene's landmarks and otherwise by the shape of
     the skin."""
@@ -86,9 +72,9 @@ class ProfileAngles:
 
     def given(self, scene):
         from sheet import landmarks
-        named = re.search(r"\blandmarks:\s*['\"]?([^'\"\n#{},]+)", scene.read_text(encoding="utf-8-sig"))
+        named = named_file(scene, "landmarks")
         try:
-            read = landmarks.read_landmarks(scene.parent / named[1].strip()) if named else {}
+            read = landmarks.read_landmarks(named) if named else {}
         except landmarks.Unusable:
             return {}
         near = {name: landmarks.on_surface(self.before, self.before, self.corners, self.axes @ point)
@@ -164,7 +150,7 @@ class Handler(http.server.BaseHTTPRequestHandler):
             work = {"/solve": self.solve, "/scene_file": self.scene_file,
                     "/result": self.result, "/report": self.report}[self.path]
             self.reply(200, work(request))
-        except Refused as refusal:
+        except (Refused, Unusable) as refusal:
             overtaken = str(refusal).startswith("abandoned")  # the page has requested another since
             self.reply(204 if overtaken else 409, b"" if overtaken else str(refusal).encode(),
                        "text/plain; charset=utf-8")
@@ -191,7 +177,9 @@ class Handler(http.server.BaseHTTPRequestHandler):
         return json.dumps(said).encode()
 
     def scene_file(self, request):
-        return scene_with_moves(self.server.scene, request["moves"]).encode()
+        scene = self.server.scene
+        return (f"# The plan of {scene.name} as of drivers/live.py; belongs in its folder.\n"
+                f"{with_moves(scene, request['moves'])}").encode()
 
     def result(self, request):
         with self.server.writing:

@@ -22,6 +22,9 @@ pitch), along the axes of the head, whatever those of the scan (docs/guide/anato
 
 After an edit of plan/scene.yaml: repose-solve plan/scene.yaml -output plan/face."""
 
+import fcntl
+import itertools
+import math
 import os
 import pathlib
 import re
@@ -62,7 +65,7 @@ OSTEOTOMIES = {"Le Fort I": ("skull", "maxilla", "le_fort_1"),
 SKIN, BONE = -300, 226  # HU, levels
 CORE = 150  # HU above the skin's level: foam of a headrest stays below
 NEEDED = ("skin", "skull", "mandible")
-PROPOSED = "Proposed by drivers/plan.py"
+PROPOSED, NOT_ENDED = "Proposed by drivers/plan.py", "whose run has not ended"
 # Files of a run in its folder, which the next run removes.
 WRITTEN = ("skin.ply", "skull.ply", "maxilla.ply", "skull_and_maxilla.ply", "mandible.ply", "bone_1.ply", "bone_2.ply", "bone_1.mrk.json",
            "bone_2.mrk.json", "landmarks.mrk.json", "landmarks.svg", "scene.yaml", "proposal.png", "face.h5",
@@ -70,6 +73,8 @@ WRITTEN = ("skin.ply", "skull.ply", "maxilla.ply", "skull_and_maxilla.ply", "man
            "face.png", "face.html")
 # Template → back and up of the head in each direction in which its piece moves towards what it is cut from.
 INWARDS = {"le_fort_1": ((0, 1), (1, 0)), "genioplasty": ((0.42, 0.91),)}
+# Template → mm: half the width of the cut, its length behind the pivot, and its height above that.
+EXTENT = {"le_fort_1": (30, 50, 28), "genioplasty": (20, 20, 15)}
 
 
 def program(name):
@@ -193,26 +198,46 @@ def bounds(file):
 EDITED = ("scene.yaml", "landmarks.mrk.json")  # by people: the next run renames them
 
 
+def lock(folder):
+    """Keeps other runs out of a folder until this process ends."""
+    try:
+        fcntl.flock(os.open(folder, os.O_RDONLY), fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        refuse(f"{folder}: another run of this program is at work in it; wait for its end, or give another folder by "
+               "-output")
+    except OSError:
+        pass  # a file system without locks
+
+
+def rename_old(file):
+    """Renames a file to old_…, or to old_2_… where that exists, and so on."""
+    numbered = (file.with_name(f"old_{n}_{file.name}") for n in itertools.count(2))
+    free = itertools.chain([file.with_name(f"old_{file.name}")], numbered)
+    file.rename(next(name for name in free if not name.exists()))
+
+
 def begin_run(folder, operations, inputs):
     """Makes the folder of a run, without the files that an earlier run wrote into it, except inputs of this one.
     Refuses files of these names in a folder without a scene of this program."""
-    scene, inputs = folder / "scene.yaml", {file.resolve() for file in inputs}
-    old = [file for file in (folder / name for name in WRITTEN) if file.exists() and file.resolve() not in inputs]
-    if old and not (scene.is_file() and PROPOSED in scene.read_text(errors="replace")):
-        refuse(f"{old[0]} exists, and {scene} was not written by this program: give another folder by -output")
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as reason:
         refuse(f"{folder}: {reason.strerror}")
+    lock(folder)
+    scene, inputs = folder / "scene.yaml", {file.resolve() for file in inputs}
+    old = [file for file in (folder / name for name in WRITTEN) if file.exists() and file.resolve() not in inputs]
+    begun = scene.read_text(errors="replace") if scene.is_file() else ""
+    if old and PROPOSED not in begun:
+        refuse(f"{old[0]} exists, and {scene} was not written by this program: give another folder by -output")
     for file in old:
-        if file.name in EDITED:
-            file.replace(file.with_name(f"old_{file.name}"))
+        if file.name in EDITED and not (file == scene and NOT_ENDED in begun):
+            rename_old(file)
         else:
             file.unlink()
     if old:
         print(f"removed from {folder}: files of an earlier run; {' and '.join(EDITED)} are renamed to old_…",
               flush=True)
-    scene.write_text(f"# {summarize(operations)}.\n# {PROPOSED}, whose run has not ended.\n")
+    scene.write_text(f"# {summarize(operations)}.\n# {PROPOSED}, {NOT_ENDED}.\n")
 
 
 def extract_labels(labels, folder, work, with_skin):
@@ -266,9 +291,11 @@ def read_or_refuse(text):
 
 
 def kerf_of(template, move):
-    """mm: the saw's, or so much that a piece which moves towards what it is cut from has room."""
-    back = move.get("set_back", 0) - move.get("advance", 0)
-    up = move.get("impaction", 0) - move.get("lower", 0)
+    """mm: the saw's, or so much that a piece which moves or turns towards what it is cut from has room."""
+    yaw, roll, pitch = (math.sin(math.radians(move.get(key, 0))) for key in ("yaw", "roll", "pitch"))
+    aside, behind, above = EXTENT.get(template, (0, 0, 0))
+    back = move.get("set_back", 0) - move.get("advance", 0) + aside * abs(yaw) + above * max(0, -pitch)
+    up = move.get("impaction", 0) - move.get("lower", 0) + aside * abs(roll) + behind * max(0, pitch)
     inwards = [along_back * back + along_up * up for along_back, along_up in INWARDS.get(template, ())]
     return min(20, max([0.5, *(way + 1 for way in inwards)]))
 
@@ -338,7 +365,7 @@ def main():
     mpi_environment()
     options, begin = arguments(), time.monotonic()
     folder, volume, labels = options.output, options.volumes[0], options.volumes[-1]
-    for file in options.volumes:
+    for file in [*options.volumes, *(options.apart or [])]:
         if not file.exists():
             refuse(f"{file}: no such file or folder")
     if folder.exists() and not folder.is_dir():

@@ -18,6 +18,7 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
 import plan  # noqa: E402
 import render  # noqa: E402
 from sheet.landmarks import read_landmarks  # noqa: E402
+from sheet.scene import named_file, read_scene  # noqa: E402
 from sheet.script import Arguments, Unusable, reading, refuse  # noqa: E402
 from sheet.script import run as run_script  # noqa: E402
 from sheet.whole_file import Target  # noqa: E402
@@ -207,12 +208,11 @@ def main():
     render.load_modules()
     np, vtk = render.np, render.vtk
     file = chosen.scene
-    scene = render.read_scene(file)
+    scene = read_scene(file)
     if not isinstance(scene.get("skin"), str):
         raise Unusable(f"{file}: its skin is no file; make one with repose-isosurface")
-    with reading(file, "a scene that repose-solve takes"):
-        named = (scene.get("anatomy") or scene).get("landmarks")
-        marks = read_landmarks(file.parent / named) if named else {}
+    named = named_file(file, "landmarks")
+    marks = read_landmarks(named) if named else {}
     with tempfile.TemporaryDirectory() as folder:
         work = pathlib.Path(folder)
         parts = parts_of(file, work)

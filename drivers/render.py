@@ -301,23 +301,9 @@ def read_mesh(file):
     return source.GetOutput()
 
 
-def read_scene(file):
-    try:
-        import yaml
-    except ImportError:
-        refuse("scenes need PyYAML: pip install pyyaml, or apt-get install python3-yaml")
-    with reading(file, "a scene in YAML"), open(file, encoding="utf-8-sig") as text:
-        try:
-            scene = yaml.safe_load(text)
-        except yaml.YAMLError as reason:
-            raise ValueError(" ".join(str(reason).split())) from None
-    if not isinstance(scene, dict):
-        raise Unusable(f"{file}: not a scene: it holds no keys such as skin, bones and tissue")
-    return scene
-
-
 def read_instruments(file):
     """[(shape, push)] of a scene, the shapes as the scene gives them: before the push."""
+    from sheet.scene import read_scene  # needs PyYAML
     with reading(file, "a scene that repose-solve takes"):
         return [(shape_of(entry, os.path.dirname(os.path.abspath(file))), np.array(entry["push"]))
                 for entry in read_scene(file).get("instruments") or []]

@@ -10,14 +10,13 @@ which the page compares with it. -scene shows the scene file and takes its landm
 or the photograph of its skin; -landmarks takes others: 3D Slicer's .mrk.json or .fcsv, .csv, or
 JSON {"name": [x, y, z], …}; -skin takes colors or photograph of another mesh of this skin (.ply with
 colors, .obj with colors or a texture); -norms other norms than those of drivers/sheet/norms.json. In
-mm; axes +x patient left, +y posterior, +z up. Needs: apt-get install python3-numpy python3-h5py
+mm; axes +x patient left, +y posterior, +z up. Needs: apt-get install python3-numpy python3-h5py,
+and python3-yaml for -scene.
 """
 
 import os
-import pathlib
-import re
 
-from sheet.script import Arguments, own_names, reading, refuse, refuse_missing, result_name, run
+from sheet.script import Arguments, own_names, refuse, refuse_missing, result_name, run
 from sheet.whole_file import Target
 
 try:
@@ -26,16 +25,6 @@ try:
     from sheet.result import Result
 except ImportError as missing:
     refuse_missing(missing, "apt-get install --no-install-recommends python3-numpy python3-h5py")
-
-
-def of_scene(scene, key):
-    """The file that a line `key: file` of a scene names, or the same key of its anatomy; or nothing."""
-    with reading(scene, "a scene (text in UTF-8)"):
-        text = pathlib.Path(scene).read_text(encoding="utf-8-sig")
-    file = r"\s*['\"]?([^'\"\n#{},]+)"
-    found = (re.search(rf"^{key}:{file}", text, re.M)
-             or re.search(rf"^anatomy:(?:.*\n[ \t]+)*?.*?\b{key}:{file}", text, re.M))
-    return os.path.join(os.path.dirname(scene), found[1].strip()) if found else None
 
 
 def arguments():
@@ -52,8 +41,9 @@ def arguments():
             refuse(f"{file}: no such file")
     chosen.colors = chosen.skin
     if chosen.scene:
-        chosen.landmarks = chosen.landmarks or of_scene(chosen.scene, "landmarks")
-        skin = of_scene(chosen.scene, "skin")
+        from sheet.scene import named_file  # needs PyYAML
+        chosen.landmarks = chosen.landmarks or named_file(chosen.scene, "landmarks")
+        skin = named_file(chosen.scene, "skin")
         chosen.skin = chosen.skin or (skin if skin and os.path.isfile(skin) else None)
     chosen.output = Target(chosen.output or "_and_".join(
         [chosen.names[0], *map(os.path.basename, chosen.names[1:])]) + ".html", (".html", ".htm"),

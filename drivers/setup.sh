@@ -7,10 +7,10 @@ build_packages=(
   libeigen3-dev libcgal-dev libyaml-cpp-dev nlohmann-json3-dev libfmt-dev
   libinsighttoolkit5-dev zlib1g-dev # volumes: DICOM, NIfTI, NRRD, MetaImage
 )
-report_packages=(python3 python3-numpy python3-h5py) # drivers/report.py
+report_packages=(python3 python3-numpy python3-h5py python3-yaml) # drivers/report.py
 test_packages=(
   libgtest-dev libbenchmark-dev clang-format
-  python3 python3-pytest python3-numpy python3-scipy python3-h5py python3-meshio
+  python3 python3-pytest python3-numpy python3-scipy python3-h5py python3-meshio python3-yaml
 )
 # Nobody needs these: what tests/benchmark compares with, and what its pictures are drawn by.
 # To have them: . drivers/setup.sh; install_packages "${benchmark_packages[@]}"

@@ -134,7 +134,9 @@ def scene_of(operation, bones=("skull", "mandible")):
 @pytest.mark.parametrize("operation, kerfs", [
     ("Le Fort I, 5 mm forward", [1]), ("Le Fort I, 5 mm forward, 2 up", [3]), ("Le Fort I, 4 mm back", [5]),
     ("genioplasty, 8 mm forward", [0.5]), ("genioplasty, 4 mm back, 3 mm up", [5.41]), ("BSSO set-back of 5 mm", [0.5]),
-    ("Le Fort I 4 mm up, BSSO 5 mm back", [5, 0.5])])
+    ("Le Fort I 4 mm up, BSSO 5 mm back", [5, 0.5]), ("Le Fort I, roll 4 degrees", [3.09]),
+    ("Le Fort I, roll -4 degrees", [3.09]), ("Le Fort I, pitch 3 degrees, 1 down", [2.62]),
+    ("Le Fort I, pitch -3 degrees, 2 forward", [1]), ("Le Fort I, yaw -4 degrees", [3.09])])
 def test_bone_is_taken_out_where_a_piece_moves_towards_it(operation, kerfs):
     found = [float(kerf) for kerf in re.findall("kerf: ([0-9.]+)", scene_of(operation))]
     assert found == pytest.approx(kerfs, abs=0.01)
@@ -290,14 +292,30 @@ def rerun(tmp_path, environment):
 
 @pytest.mark.parametrize("options, kept", [
     ([], set()), (["-apart", "plan/bone_1.mrk.json", "plan/bone_2.mrk.json"], {"bone_1.mrk.json", "bone_2.mrk.json"})])
-def test_a_folder_that_is_used_again_holds_one_run(rerun, options, kept, tmp_path):
+def test_a_folder_that_is_used_again_holds_one_run(rerun, options, kept, tmp_path, environment):
     result, names = rerun(scene_of("Le Fort I, 5 mm forward"), *options)
     assert "repose-isosurface ended" in result.stderr and "of an earlier run" in result.stdout
     assert names == {"scene.yaml", "old_scene.yaml", "old_landmarks.mrk.json", "notes.txt", "label_3.ply"} | kept
     assert scene_of("Le Fort I, 5 mm forward") in (tmp_path / "plan/old_scene.yaml").read_text(), "edits are kept"
-    result, names = rerun("# " + plan.PROPOSED)
-    assert names == {"scene.yaml", "old_scene.yaml", "old_landmarks.mrk.json", "notes.txt", "label_3.ply"}, (
-        "a run that failed is no obstacle")
+    again = finish([sys.executable, SCRIPT, "ct.mhd", "-operation", "jaw, 5 mm forward"], tmp_path,
+                   environment | {"REPOSE_BUILD": str(tmp_path)}, 60)
+    assert "repose-isosurface ended" in again.stderr, "a run that failed is no obstacle"
+    assert {path.name for path in (tmp_path / "plan").iterdir()} == names - kept
+    assert scene_of("Le Fort I, 5 mm forward") in (tmp_path / "plan/old_scene.yaml").read_text(), "edits are kept"
+    _, names = rerun("# " + plan.PROPOSED)
+    assert {"old_scene.yaml", "old_2_scene.yaml"} <= names, "edits of two runs are kept"
+
+
+def test_a_folder_in_which_a_run_is_at_work_is_refused(rerun, tmp_path):
+    plan.lock(tmp_path / "plan")
+    result, names = rerun(scene_of("Le Fort I, 5 mm forward"))
+    assert "plan: another run of this program is at work in it" in result.stderr
+    assert names == {*plan.WRITTEN, "notes.txt", "label_3.ply"}
+
+
+def test_points_that_are_not_there_are_refused_before_anything_is_removed(rerun):
+    result, names = rerun(scene_of("Le Fort I, 5 mm forward"), "-apart", "skull.mrk.json", "jaw.mrk.json")
+    assert "skull.mrk.json: no such file" in result.stderr and names == {*plan.WRITTEN, "notes.txt", "label_3.ply"}
 
 
 def test_files_of_others_are_not_removed(rerun):

@@ -15,7 +15,6 @@ import pytest
 from conftest import PROJECT
 
 sys.path[:0] = [str(PROJECT / "drivers"), str(PROJECT / "drivers/python")]
-import live  # noqa: E402
 from repose.scene import Scene  # noqa: E402
 from sheet import tables  # noqa: E402
 from sheet.appearance import read_appearance, read_ply  # noqa: E402
@@ -25,6 +24,7 @@ from sheet.meshes import coarser  # noqa: E402
 from sheet.page import plan_table  # noqa: E402
 from sheet.profile import middle_plane  # noqa: E402
 from sheet.published import PUBLISHED  # noqa: E402
+from sheet.scene import with_moves  # noqa: E402
 from sheet.script import Unusable, own_names  # noqa: E402
 from sheet.shown_skin import Skin, matching_rows, rows_of_patient  # noqa: E402
 from sheet.whole_file import Target  # noqa: E402
@@ -198,7 +198,7 @@ def test_a_scene_that_is_written_again_begins_without_a_byte_order_mark(tmp_path
     scene = tmp_path / "scene.yaml"
     scene.write_text(MARKED, encoding="utf-8", newline="")
     Scene(scene).with_plan(["chin"], tmp_path / "planned.yaml")
-    for text in ((tmp_path / "planned.yaml").read_text(encoding="utf-8"), live.scene_with_moves(scene, {}),
+    for text in ((tmp_path / "planned.yaml").read_text(encoding="utf-8"), with_moves(scene, {}),
                  tables.provenance(Nothing(tmp_path), scene)):
         assert "skin: face.ply" in text and "\ufeff" not in text
 
