@@ -79,12 +79,22 @@ def larger_areas(h5):
     area[...] = area[:] * 1.01
 
 
+def deeper(h5):
+    """The most pressed point 0.05 mm inside, and the penetration as stated."""
+    step = last_step(h5)
+    gap = step["point/contact_gap"]
+    gap[int(np.argmax(step["point/contact_pressure"][:]))] = -0.05
+    step.attrs["penetration"] = 0.05
+
+
 SPOILED = {
     "penetration stated 0.1 mm too deep": (state("penetration", lambda v: v + 0.1), "penetration"),
     "exact penetration stated as none": (state("penetration_exact", lambda v: 0.0),
                                          "penetration_exact"),
     "exact penetration that is not there": (state("penetration_exact", lambda v: v + 0.01),
                                             "penetration_exact"),
+    "exact penetration off by 1e-5 mm": (state("penetration_exact", lambda v: v + 1e-5), "penetration_exact"),
+    "a gap and a penetration of 0.05 mm": (deeper, "contact_gap of point"),
     "a gap where tissue presses": (in_array("contact_gap", lambda v: v + 4), "contact_gap of point"),
     "a force that is turned by a degree": (in_array("contact_force", lambda v: v + 0.0175 * np.cross(v, (0.6, 0.8, 0))),
                                            "contact_force of point"),

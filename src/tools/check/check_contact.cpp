@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
 
 #include "cut_faces.h"
 #include "obstacle.h"
@@ -16,16 +17,14 @@ namespace {
 
 constexpr double considered = 6;       // mm, the stated gap where nothing is nearer
 constexpr double largest_slope = 1.4;  // of interpolated distances, beside edges
-constexpr double exact_to = 1e-4;      // mm, of a penetration that two programs measure exactly
+constexpr double exact_to = 1e-6;      // mm, of a penetration that two programs measure exactly
+constexpr double single_to = 1e-5;     // mm, of distances that are kept in single precision
 
 const std::vector<double>* field(const model::StepRows& rows, const char* name) {
   for (const model::PointField& field : rows.point_fields)
     if (field.name == name) return &field.values;
   return nullptr;
 }
-
-/// mm, by which smoothed distances may differ from those on grids that lie elsewhere.
-double smoothing_bound(double spacing) { return 0.1 * spacing + 0.05; }
 
 /// mm, that a step's positions are uncertain by.
 double slack_of(const model::StepNumbers& numbers) {
@@ -43,8 +42,8 @@ std::array<std::array<double, 4>, 2> spline_weights(double t) {
 
 /// Recomputed contact of one point.
 struct AtPoint {
-  double gap = considered;  // mm, the smaller of the next two
-  double body_gap = considered, wall_gap = considered;
+  double gap = considered;               // mm, the smaller of that to bodies and that to cuts
+  double body_gap = considered;          // mm
   std::vector<double> wall_gaps;         // of all places, at all minima
   double largest_wall_gap = considered;  // smallest over the places of their largest
   int32_t body = -1;                     // that it is to; −1: the side of a cut
@@ -82,6 +81,7 @@ class Bodies {
         pose.topRightCorner<3, 1>() = load * body.push;
       poses_.push_back(pose);
     }
+    nodes_.resize(shapes_.size());
   }
   bool is_mesh(int32_t body) const { return shapes_[body].is_mesh(); }
   /// Where a point in space is beside a body at load 0.
@@ -93,66 +93,51 @@ class Bodies {
   double distance(int32_t body, const Vec3& beside) const {
     return shapes_[body].distance(beside, reach);
   }
-  /// Distance to a mesh by the solver's cubic B-spline, on a grid that has one of its points, or
-  /// the middle of a cell, at the point.
-  double smoothed_distance(int32_t body, const Vec3& beside, bool in_cell) const {
-    if (!is_mesh(body)) return distance(body, beside);
-    const double here = averaged_distance(body, beside, in_cell);
-    double second_differences = -6 * here;
-    for (int a = 0; a < 3; ++a)
-      for (const double side : {-spacing_, spacing_})
-        second_differences += averaged_distance(body, beside + side * Vec3::Unit(a), in_cell);
-    return here - second_differences / 6;
+  /// mm, of a point given by beside(), as the solver computes it: to a mesh by a cubic B-spline.
+  double solver_distance(int32_t body, const Vec3& beside) const {
+    return is_mesh(body) ? sample(body, beside)[3] : distance(body, beside);
   }
   /// Gradient at a point in space of the distance that the solver uses.
   Vec3 gradient(int32_t body, const Vec3& point) const {
     const Vec3 at = beside(body, point);
     return poses_[body].topLeftCorner<3, 3>() *
-           (is_mesh(body) ? spline_gradient(body, at) : shapes_[body].normal(at));
+           (is_mesh(body) ? Vec3(sample(body, at).head<3>()) : shapes_[body].normal(at));
   }
+  /// mm, by which the distance to a mesh must exceed a gap for the solver to take it as it is.
+  double smoothing() const { return 1.67 * spacing_ + single_to; }
 
  private:
-  /// Gradient of the cubic B-spline on the solver's grid (docs/reference/formats.md).
-  Vec3 spline_gradient(int32_t body, const Vec3& beside) const {
+  /// Gradient and value of the cubic B-spline on the solver's grid (docs/reference/formats.md).
+  Eigen::Vector4d sample(int32_t body, const Vec3& beside) const {
     const Vec3 origin = shapes_[body].low_corner() - Vec3::Constant(kept_ + 4 * spacing_);
     const Vec3 at = (beside - origin) / spacing_, first = at.array().floor() - 1;
     std::array<std::array<std::array<double, 4>, 2>, 3> weights;
     for (int a = 0; a < 3; ++a) weights[a] = spline_weights(at[a] - first[a] - 1);
     constexpr int side = 6;  // the coefficients, and a neighbor on each side
     std::array<double, side * side * side> value;
-    for (int n = 0; n < side * side * side; ++n) {
-      const Vec3 node(n / 36, n / 6 % 6, n % 6);
-      value[n] = shapes_[body].distance(origin + spacing_ * (first + node - Vec3::Ones()), kept_);
-    }
-    Vec3 gradient = Vec3::Zero();
+    for (int n = 0; n < side * side * side; ++n)
+      value[n] = at_node(body, origin, first + Vec3(n / 36 - 1, n / 6 % 6 - 1, n % 6 - 1));
+    Eigen::Vector4d sum = Eigen::Vector4d::Zero();
     for (int n = 0; n < 64; ++n) {
       const std::array<int, 3> node{n / 16, n / 4 % 4, n % 4};
       const int here = 36 * (node[0] + 1) + 6 * (node[1] + 1) + node[2] + 1;
       const double beside_it = value[here - 36] + value[here + 36] + value[here - 6] +
                                value[here + 6] + value[here - 1] + value[here + 1];
       const double coefficient = 2 * value[here] - beside_it / 6;
-      for (int a = 0; a < 3; ++a) {
-        double weight = 1 / spacing_;
+      for (int a = 0; a < 4; ++a) {  // the derivatives along the axes, then none
+        double weight = a < 3 ? 1 / spacing_ : 1;
         for (int b = 0; b < 3; ++b) weight *= weights[b][a == b][node[b]];
-        gradient[a] += weight * coefficient;
+        sum[a] += weight * coefficient;
       }
     }
-    return gradient;
+    return sum;
   }
 
-  /// With the distances themselves as coefficients.
-  double averaged_distance(int32_t body, const Vec3& beside, bool in_cell) const {
-    static const std::vector<std::pair<double, double>> at_point = {
-        {-1, 1.0 / 6}, {0, 2.0 / 3}, {1, 1.0 / 6}};
-    static const std::vector<std::pair<double, double>> at_middle = {
-        {-1.5, 1.0 / 48}, {-0.5, 23.0 / 48}, {0.5, 23.0 / 48}, {1.5, 1.0 / 48}};
-    const auto& nodes = in_cell ? at_middle : at_point;
-    double sum = 0;
-    for (const auto& [x, wx] : nodes)
-      for (const auto& [y, wy] : nodes)
-        for (const auto& [z, wz] : nodes)
-          sum += wx * wy * wz * shapes_[body].distance(beside + spacing_ * Vec3(x, y, z), kept_);
-    return sum;
+  /// mm, of a point of the solver's grid, computed once.
+  double at_node(int32_t body, const Vec3& origin, const Vec3& node) const {
+    const auto [known, is_new] = nodes_[body].try_emplace({node.x(), node.y(), node.z()});
+    if (is_new) known->second = shapes_[body].distance(origin + spacing_ * node, kept_);
+    return known->second;
   }
 
   static constexpr double reach = considered + 2;  // mm
@@ -160,31 +145,37 @@ class Bodies {
   double kept_;                                    // mm, up to which the solver keeps distances
   std::vector<Obstacle> shapes_;
   std::vector<Mat4> poses_;
+  mutable std::vector<std::map<std::array<double, 3>, double>> nodes_;  // mm, by body
 };
 
 /// `slack` in mm: bodies that are nearer may press.
 void add_bodies(const model::Model& model, const Bodies& bodies, const std::vector<Vec3>& position,
                 double slack, Truth& truth) {
   const model::ContactPairs& pairs = model.contact.pairs;
+  constexpr double exact_from = 1;  // mm, of gaps
   for (size_t c = 0; c < pairs.point.size(); ++c) {
     const int64_t row = pairs.point[c];
     const int32_t body = pairs.body[c];
-    const bool slides = pairs.binding[c] == model::Binding::slides;
-    const bool mesh = bodies.is_mesh(body);
-    const double now = bodies.distance(body, bodies.beside(body, position[row]));
-    double initial = slides || now < 0 ? bodies.distance(body, model.points.position[row]) : 0;
-    if (mesh && slides && initial >= considered) initial = now;  // distances are kept no farther
-    const double gap = now - (slides ? initial : std::min(initial, 0.0));
+    const bool slides = pairs.binding[c] == model::Binding::slides, mesh = bodies.is_mesh(body);
+    const Vec3 beside = bodies.beside(body, position[row]), &before = model.points.position[row];
+    const double exact = bodies.distance(body, beside),
+                 exact_before = bodies.distance(body, before);
+    double offset = 0;
+    if (slides || exact_before < (mesh ? bodies.smoothing() : 0))
+      offset = bodies.solver_distance(body, before);
+    if (!slides) offset = std::min(offset, 0.0);
+    const bool away = mesh && !slides && exact - offset >= exact_from + bodies.smoothing();
+    const double gap = (away ? exact : bodies.solver_distance(body, beside)) - offset;
     AtPoint& point = truth.points[row];
     point.slides = point.slides || slides;
     point.mesh = point.mesh || mesh;
     point.area = pairs.area[c];
-    if (slides || gap <= slack + (mesh ? model.contact.spacing : 0)) point.pressing.push_back(body);
+    if (slides || gap <= slack + single_to) point.pressing.push_back(body);
     if (gap <= point.gap) {
       point.gap = point.body_gap = gap;
       point.body = body;
     }
-    truth.offer(std::min(initial, 0.0) - now, row, body);
+    truth.offer(std::min(exact_before, 0.0) - exact, row, body);
   }
 }
 
@@ -194,7 +185,6 @@ void add_cut_faces(const model::Model& model, const std::vector<Vec3>& position,
     AtPoint& point = truth.points[at.point];
     if (at.gap[0] < point.gap) point.body = -1;
     point.gap = std::min(point.gap, at.gap[0]);
-    point.wall_gap = std::min(point.wall_gap, at.gap[0]);
     point.largest_wall_gap = std::min(point.largest_wall_gap, std::ranges::max(at.gap));
     point.wall_gaps.insert(point.wall_gaps.end(), at.gap.begin(), at.gap.end());
   }
@@ -239,8 +229,7 @@ class Claims {
         position_(position),
         bodies_(bodies),
         truth_(truth),
-        comparison_(comparison),
-        bound_(smoothing_bound(model.contact.spacing)) {}
+        comparison_(comparison) {}
 
   void check_gaps(const std::vector<double>& stated);
   void check_depths(const std::vector<double>& gap);
@@ -248,14 +237,6 @@ class Claims {
   void check_forces(const std::vector<double>& pressure, const std::vector<double>& force);
 
  private:
-  double smoothed_gap(int64_t point, bool in_cell) const;
-  bool explained(int64_t point, double stated) const;
-  /// mm, by which a gap may differ from the exact one without a closer look: more where nothing can
-  /// press for long.
-  double allowed(double gap) const {
-    constexpr double far = 3;  // mm
-    return gap > far ? 0.5 * model_.contact.spacing + 0.1 : bound_;
-  }
   std::string name_of(int32_t body) const {
     return body < 0 ? "the sides of cuts" : "'" + model_.contact.bodies[body].name + "'";
   }
@@ -266,40 +247,7 @@ class Claims {
   const Bodies& bodies_;
   const Truth& truth_;
   Comparison& comparison_;
-  double bound_;  // mm
 };
-
-/// mm, the gap of a point to bodies whose distances are averaged as the solver's grids do.
-double Claims::smoothed_gap(int64_t point, bool in_cell) const {
-  const model::ContactPairs& pairs = model_.contact.pairs;
-  const double spacing = model_.contact.spacing;  // more than an average lies off
-  double gap = truth_.points[point].wall_gap;
-  for (size_t c = 0; c < pairs.point.size(); ++c) {
-    if (pairs.point[c] != point) continue;
-    const int32_t body = pairs.body[c];
-    const bool slides = pairs.binding[c] == model::Binding::slides;
-    const Vec3 beside = bodies_.beside(body, position_[point]);
-    const Vec3& before = model_.points.position[point];
-    if (!slides && bodies_.distance(body, beside) - spacing > gap) continue;
-    const double now = bodies_.smoothed_distance(body, beside, in_cell);
-    double initial = 0;
-    if (slides || bodies_.distance(body, before) < spacing)
-      initial = bodies_.smoothed_distance(body, before, in_cell);
-    gap = std::min(gap, now - (slides ? initial : std::min(initial, 0.0)));
-  }
-  return gap;
-}
-
-/// Returns whether a gap lies between the exact one and a smoothed one.
-bool Claims::explained(int64_t point, double stated) const {
-  const double exact = truth_.points[point].gap;
-  if (std::abs(stated - exact) <= allowed(std::min(stated, exact))) return true;
-  for (const bool in_cell : {false, true}) {
-    const auto [low, high] = std::minmax({exact, smoothed_gap(point, in_cell)});
-    if (stated >= low - bound_ && stated <= high + bound_) return true;
-  }
-  return false;
-}
 
 /// The gap of a point that is nearest to a stated one: that of each of its places may be at any
 /// minimum.
@@ -317,22 +265,21 @@ void Claims::check_gaps(const std::vector<double>& stated) {
   std::vector<double> gaps, again;
   Worst worst;
   for (size_t i = 0; i < stated.size(); ++i) {
-    const AtPoint& point = truth_.points[i];
-    const bool at_cut = point.wall_gap < point.body_gap - 2 * allowed(point.body_gap);
-    if (!point.mesh || at_cut) {
+    const double nearest = nearest_gap(truth_.points[i], stated[i]);
+    if (!truth_.points[i].mesh) {
       gaps.push_back(stated[i]);
-      again.push_back(nearest_gap(point, stated[i]));
-    } else if (!explained(static_cast<int64_t>(i), stated[i])) {
-      worst.offer(std::abs(stated[i] - point.gap), [&] {
-        return fmt::format(
-            "contact_gap of point {} to {}: stated {:.4g} mm, by the triangles {:.4g} mm, which "
-            "the smoothing of a grid of {:.3g} mm does not explain",
-            i, name_of(point.body), stated[i], point.gap, model_.contact.spacing);
-      });
+      again.push_back(nearest);
+      continue;
     }
+    const double off = std::abs(stated[i] - nearest);
+    worst.offer(off <= single_to ? 0 : off, [&] {
+      return fmt::format(
+          "contact_gap of point {} to {}: stated {:.6g} mm, by its triangles {:.6g} mm", i,
+          name_of(truth_.points[i].body), stated[i], nearest);
+    });
   }
   comparison_.array("point/contact_gap", gaps, again, considered);
-  worst.state("gaps to meshes are those to their triangles, but for smoothing", comparison_);
+  worst.state("gaps to meshes follow from their triangles, to 1e-5 mm", comparison_);
 }
 
 void Claims::check_depths(const std::vector<double>& gap) {

@@ -7,10 +7,9 @@
 namespace repose::tools::check {
 
 /// Checks what a step states about contact against the bodies' own triangles and closed forms
-/// (obstacle.h), which share nothing with the distances that the solver uses. The solver smooths
-/// meshes on a grid: a stated gap below 3 mm must lie between the exact one and the exact one
-/// averaged in the same way, within a tenth of the spacing and 0.05 mm. The penetration must be
-/// that of the deepest stated gap, the exact penetration that of the triangles within 1e-4 mm.
+/// (obstacle.h), which share nothing with the distances that the solver uses. Gaps must be those of
+/// the file format's definition, to meshes within 1e-5 mm. The penetration must be that of the
+/// deepest stated gap, the exact penetration that into the triangles within 1e-6 mm.
 /// Forces must be pressure times area along the body's normal where that is well defined, never
 /// pull except where points slide, and not act across a gap wider than the step's displacement
 /// error. Pressures must be those that the forces determine, by the gradient of the smoothed

@@ -86,6 +86,10 @@ TriangleGrid::TriangleGrid(const surface::Surface& surface) {
     facing += normal;
     area += normal.norm();
     triangles_.push_back(corners);
+    const Vec3 center = (corners[0] + corners[1] + corners[2]) / 3;
+    double radius = 0;
+    for (const Vec3& corner : corners) radius = std::max(radius, (corner - center).norm());
+    balls_.push_back({center, radius});
   }
   closed_ = facing.norm() <= 1e-6 * area;
   edge_ = std::max((high_ - low_).maxCoeff() / cells_along(triangles_.size()),
@@ -122,26 +126,30 @@ void TriangleGrid::visit_near(const Vec3& point, double radius, Visit&& visit) c
   for (int64_t i = from[0]; i <= to[0]; ++i)
     for (int64_t j = from[1]; j <= to[1]; ++j)
       for (int64_t k = from[2]; k <= to[2]; ++k)
-        for (const int32_t t : cells_[(i * size_[1] + j) * size_[2] + k]) visit(triangles_[t]);
+        for (const int32_t t : cells_[(i * size_[1] + j) * size_[2] + k]) visit(t);
 }
 
 double TriangleGrid::distance(const Vec3& point, double reach) const {
   const Vec3 p = oblique() * point;
-  double nearest = reach;
-  for (double radius = std::min(edge_, reach);; radius = std::min(2 * radius, reach)) {
-    visit_near(p, radius, [&](const Corners& t) {
-      nearest = std::min(nearest, (p - closest_on_triangle(p, t)).norm());
-    });
-    if (nearest <= radius || radius == reach) return nearest;
-  }
+  const auto to = [&](int32_t t) { return (p - closest_on_triangle(p, triangles_[t])).norm(); };
+  double nearest = triangles_.empty() ? reach : std::min(reach, to(latest_));
+  visit_near(p, nearest, [&](int32_t t) {
+    const double enough = nearest + balls_[t].radius;
+    if ((p - balls_[t].center).squaredNorm() >= enough * enough) return;
+    if (const double distance = to(t); distance < nearest) {
+      nearest = distance;
+      latest_ = t;
+    }
+  });
+  return nearest;
 }
 
 std::optional<Vec3> TriangleGrid::closest_point(const Vec3& point, double reach) const {
   const Vec3 p = oblique() * point;
   std::optional<Vec3> closest;
   double nearest = reach;
-  visit_near(p, reach, [&](const Corners& t) {
-    const Vec3 at = closest_on_triangle(p, t);
+  visit_near(p, reach, [&](int32_t t) {
+    const Vec3 at = closest_on_triangle(p, triangles_[t]);
     if ((p - at).norm() > nearest) return;
     nearest = (p - at).norm();
     closest = at;

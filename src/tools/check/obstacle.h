@@ -30,19 +30,25 @@ class TriangleGrid {
  private:
   using Corners = std::array<Vec3, 3>;
   using Cell = std::array<int64_t, 3>;
+  struct Ball {
+    Vec3 center;
+    double radius;  // mm
+  };
   Cell cell_of(const Vec3& point) const;
   int64_t crossings(const Vec3& point) const;
   template <class Visit>
   void visit_near(const Vec3& point, double radius, Visit&& visit) const;
 
   std::vector<Corners> triangles_;
-  Vec3 low_corner_;  // mm, of the box around all as the surface lies
+  std::vector<Ball> balls_;  // one around each triangle
+  Vec3 low_corner_;          // mm, of the box around all as the surface lies
   bool closed_ = false;
   Vec3 low_, high_;  // mm, of the box around all, turned
   double edge_ = 1;  // mm, of a cell
   Cell size_{};
   std::vector<std::vector<int32_t>> cells_;    // triangles whose boxes meet a cell
   std::vector<std::vector<int32_t>> columns_;  // the same for columns of cells along z
+  mutable int32_t latest_ = 0;                 // triangle that was closest to the latest point
 };
 
 /// A rigid body that tissue touches, beside which points are at load 0.
