@@ -361,8 +361,7 @@ std::string name_input(const std::filesystem::path& input, const std::string& me
 }  // namespace
 
 base::Exit run(const base::Options& options) {
-  solve::require_supported_types();
-  solve::require_supported_numbers();
+  solve::require_supported_options();
   const std::filesystem::path input = options.arguments()[0];
   const bool dry = options.flag("dry_run");
   try {

@@ -6,6 +6,7 @@
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
+#include <exception>
 #include <string_view>
 #include <vector>
 
@@ -15,6 +16,8 @@
 namespace repose::base {
 
 namespace {
+
+std::exception_ptr kept;  // by keep_exception()
 
 /// PETSc's own words for an error, the general and the particular ones.
 std::string text_of(PetscErrorCode code) {
@@ -39,8 +42,12 @@ void ignore_broken_pipes() {
 }  // namespace
 
 void check(PetscErrorCode code) {
-  if (code != 0) throw PetscError("PETSc: " + text_of(code));
+  if (code == 0) return;
+  if (kept) std::rethrow_exception(std::exchange(kept, nullptr));
+  throw PetscError("PETSc: " + text_of(code));
 }
+
+void keep_exception() { kept = std::current_exception(); }
 
 void check_options(PetscErrorCode code) {
   if (code == 0) return;

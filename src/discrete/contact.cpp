@@ -54,6 +54,36 @@ void Contact::round_bodies(bool rounded) {
   placed_at_ = -1;
 }
 
+void Contact::set_stiffness(double stiffness) {
+  bodies_.set_stiffness(stiffness);
+  cut_faces_.set_stiffness(stiffness);
+}
+
+ContactPressures Contact::multipliers() const {
+  const auto p = bodies_.multipliers(), q = cut_faces_.multipliers();
+  return {{p.begin(), p.end()}, {q.begin(), q.end()}};
+}
+
+void Contact::set_multipliers(ContactPressures to) {
+  to.bodies.resize(bodies_.multipliers().size(), 0.0);
+  to.cut_faces.resize(cut_faces_.size(), 0.0);
+  bodies_.set_multipliers(to.bodies);
+  cut_faces_.set_multipliers(to.cut_faces);
+}
+
+void Contact::update_gaps() {
+  bodies_.update_gaps(positions_.local());
+  cut_faces_.update_gaps(positions_.local());
+}
+
+ContactPressures Contact::pressures() const {
+  ContactPressures now;
+  for (size_t c = 0; c < bodies_.multipliers().size(); ++c)
+    now.bodies.push_back(bodies_.pressure(c));
+  for (size_t w = 0; w < cut_faces_.size(); ++w) now.cut_faces.push_back(cut_faces_.pressure(w));
+  return now;
+}
+
 void Contact::place_bodies() {
   if (placed_at_ == positions_.revision()) return;
   placed_at_ = positions_.revision();
@@ -67,8 +97,8 @@ void Contact::reset() {
   round_bodies(false);
   bodies_.reset(stiffness);
   other_bodies_.reset(stiffness);
-  cut_faces_.set_multipliers(std::vector<double>(cut_faces_.size(), 0.0));
-  cut_faces_.set_stiffness(stiffness);
+  set_multipliers({});
+  set_stiffness(stiffness);
   placed_at_ = -1;
 }
 

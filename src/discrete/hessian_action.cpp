@@ -30,7 +30,7 @@ HessianAction::HessianAction(Objective& objective)
 PetscErrorCode HessianAction::multiply(Mat matrix, Vec direction, Vec product) {
   HessianAction* self = nullptr;
   if (const PetscErrorCode code = MatShellGetContext(matrix, &self)) return code;
-  try {
+  return base::run_callback([&] {
     const Objective& objective = self->objective_;
     static const PetscLogEvent event = base::log_event("RpHessianAction");
     const base::Logged logged(event, flops_of(objective.loops(), action_flops));
@@ -41,10 +41,7 @@ PetscErrorCode HessianAction::multiply(Mat matrix, Vec direction, Vec product) {
                                   self->max_slope_);
     Objective::add_blocks(self->blocks_, self->direction_, self->product_);
     objective.positions().restrict_to_owned(self->product_, product);
-  } catch (const std::exception&) {
-    return PETSC_ERR_LIB;
-  }
-  return PETSC_SUCCESS;
+  });
 }
 
 void HessianAction::set_position(std::span<const Vec3> position) {

@@ -223,6 +223,10 @@ std::vector<Vec3> NaturalRows::owned(const std::vector<Vec3>& slab) const {
   return from_slab(points_, slab);
 }
 
+std::vector<double> NaturalRows::owned(const std::vector<double>& slab) const {
+  return from_slab(points_, slab);
+}
+
 std::vector<double> NaturalRows::at_rows(const std::vector<int64_t>& rows, int64_t total,
                                          const std::vector<double>& slab) const {
   return from_slab({rows, total}, slab);

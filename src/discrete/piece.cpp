@@ -112,9 +112,8 @@ void pick_points(Piece& piece, Part& part) {
 std::vector<surface::Surface> body_meshes(const Model& model) {
   std::vector<surface::Surface> meshes;
   for (const model::Body& body : model.contact.bodies) {
-    const auto* shape = std::get_if<surface::Surface>(&body.shape);
-    if (body.bone >= 0) shape = &model.bone_surfaces[body.bone];
-    meshes.push_back(shape ? *shape : surface::Surface{});
+    const surface::Surface* mesh = mechanics::mesh_of(model, body);
+    meshes.push_back(mesh ? *mesh : surface::Surface{});
   }
   return meshes;
 }

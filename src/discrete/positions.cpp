@@ -42,8 +42,10 @@ base::VecHandle Positions::make_vector() const {
   return v;
 }
 
-Vec3 Positions::prescribed(int64_t row, double load) const {
-  return motion_.at(part_.model, row, load);
+std::vector<Vec3> Positions::travel_to(double load) const {
+  std::vector<Vec3> travel(local_.size(), Vec3::Zero());
+  for (const int32_t i : fixed_) travel[i] = motion_.at(part_.model, i, load) - local_[i];
+  return travel;
 }
 
 std::vector<Mat4> Positions::poses_at(double load) const {
@@ -57,7 +59,7 @@ void Positions::set_load(double load) {
   load_ = load;
   poses_ = poses_at(load);
   ++revision_;
-  for (int32_t i : fixed_) local_[i] = prescribed(i, load);
+  for (int32_t i : fixed_) local_[i] = motion_.at(part_.model, i, load);
 }
 
 void Positions::set_motion(int32_t bone, const scene::RigidMotion& motion) {

@@ -67,7 +67,7 @@ void TangentEntries::make_pattern() {
     base::sort_unique(row);
     for (int32_t column : row)
       rows_[column >= first && column < last ? 0 : 1].column.push_back(column);
-    for (BlockRows& rows : rows_) rows.begin.push_back(static_cast<int32_t>(rows.column.size()));
+    for (BlockRows& rows : rows_) rows.begin.push_back(static_cast<PetscInt>(rows.column.size()));
   }
 }
 
@@ -115,9 +115,12 @@ TangentEntries::Slot TangentEntries::find(int32_t row_point, int32_t column_poin
   const int side = offset >= 0 && offset < part_.unknowns.owned ? 0 : 1;
   const BlockRows& rows = rows_[side];
   const auto first = rows.column.begin() + rows.begin[k];
-  const auto place = std::lower_bound(first, rows.column.begin() + rows.begin[k + 1], column);
-  const int32_t before = side == 0 ? 0 : 9 * rows_[0].begin.back();
-  return before + 9 * rows.begin[k] + 3 * static_cast<int32_t>(place - first);
+  const auto last = rows.column.begin() + rows.begin[k + 1];
+  const auto place = std::lower_bound(first, last, column);
+  if (place == last || *place != column)
+    throw base::InternalError("a block of the Hessian is outside its pattern");
+  const PetscInt before = side == 0 ? 0 : 9 * rows_[0].begin.back();
+  return before + 9 * rows.begin[k] + 3 * static_cast<PetscInt>(place - first);
 }
 
 std::vector<TangentEntries::PairSlots> TangentEntries::find_pairs(
@@ -144,10 +147,10 @@ void TangentEntries::find_slots() {
 void TangentEntries::add(double* const values[2], Slot slot, int32_t row_point,
                          const Mat3& block) const {
   if (slot < 0) return;
-  const int32_t beyond = 9 * rows_[0].begin.back();
+  const PetscInt beyond = 9 * rows_[0].begin.back();
   const int side = slot < beyond ? 0 : 1;
   const int64_t k = part_.unknown[row_point] - part_.unknowns.first;
-  const int32_t stride = 3 * (rows_[side].begin[k + 1] - rows_[side].begin[k]);
+  const PetscInt stride = 3 * (rows_[side].begin[k + 1] - rows_[side].begin[k]);
   double* entry = values[side] + slot - (side == 0 ? 0 : beyond);
   for (int r = 0; r < 3; ++r, entry += stride)
     for (int c = 0; c < 3; ++c) entry[c] += block(r, c);

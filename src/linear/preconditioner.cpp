@@ -112,12 +112,7 @@ void HessianPreconditioner::attach(KSP krylov) {
 }
 
 PetscErrorCode HessianPreconditioner::after_solve(KSP krylov, Vec, Vec, void* me) {
-  try {
-    static_cast<HessianPreconditioner*>(me)->lag_.observe(krylov);
-  } catch (const std::exception&) {
-    return PETSC_ERR_LIB;
-  }
-  return PETSC_SUCCESS;
+  return base::run_callback([&] { static_cast<HessianPreconditioner*>(me)->lag_.observe(krylov); });
 }
 
 void HessianPreconditioner::renew_if_worn() {
@@ -188,14 +183,11 @@ PetscErrorCode HessianPreconditioner::apply_columns(PC pc, Vec r, Vec z) {
   HessianPreconditioner* self = nullptr;
   if (const PetscErrorCode code = PCGetApplicationContext(pc, &self)) return code;
   if (self->factors_) return PCApply(self->factors_, r, z);
-  try {
+  return base::run_callback([&] {
     static const PetscLogEvent event = base::log_event("RpColumns");
     const base::Logged logged(event);
     self->columns_->apply(r, z);
-  } catch (const std::exception&) {
-    return PETSC_ERR_LIB;
-  }
-  return PETSC_SUCCESS;
+  });
 }
 
 }  // namespace repose::linear

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <optional>
 
 namespace repose::mechanics {
 
@@ -161,40 +160,35 @@ std::vector<Vec3> steps_around() {
   return steps;
 }
 
-/// A tangent plane of a body: its normal, in space, and the distance of a point from it, mm.
-struct Plane {
-  double distance;
-  Vec3 normal;
-};
+}  // namespace
 
-/// The nearest tangent plane of a body around a point inside it, at most 2 mm deep, whose normal is
-/// more than 60° from `normal`.
-std::optional<Plane> plane_round_edge(const RigidBody& body, const Vec3& beside, const Vec3& normal,
-                                      double offset) {
+/// The gap to first order of a constraint's point to the nearest tangent plane of its body around
+/// it, at most 2 mm deep, whose normal is more than 60° from the one at the latest update.
+std::optional<LinearGap> BodyContact::gap_round_edge(size_t c,
+                                                     std::span<const Vec3> position) const {
   constexpr double deepest = 2, largest_cosine = 0.5;
   static const std::vector<Vec3> steps = steps_around();
-  std::optional<Plane> nearest;
+  const RigidBody& body = bodies_[pairs_.body[c]];
+  const auto point = static_cast<int32_t>(pairs_.point[c]);
+  const Vec3 beside = body.beside(position[point]);
+  std::optional<LinearGap> nearest;
   for (const Vec3& step : steps) {
     const surface::Distance there = body.distance(beside + body.own_direction(step));
-    if (std::abs(there.value) > step.norm() || !(there.gradient.dot(normal) < largest_cosine))
+    if (std::abs(there.value) > step.norm() || !(there.gradient.dot(normal_[c]) < largest_cosine))
       continue;
-    const double distance = there.value - there.gradient.dot(step) - offset;
-    if (distance < 0 && distance > (nearest ? nearest->distance : -deepest))
-      nearest = {distance, there.gradient.normalized()};
+    const double gap = there.value - there.gradient.dot(step) - pairs_.offset[c];
+    if (gap < 0 && gap > (nearest ? nearest->gap : -deepest))
+      nearest = {c, false, pairs_.area[c], gap, {{point, there.gradient.normalized()}}, {}};
   }
   return nearest;
 }
-
-}  // namespace
 
 std::set<int32_t> BodyContact::bodies_near_edges(std::span<const Vec3> position) const {
   std::set<int32_t> found;
   for (size_t c = 0; c < pairs_.point.size(); ++c) {
     const bool touches = multiplier_[c] > 0 || slides(c);
     if (!touches || normal_[c].isZero(0) || found.contains(pairs_.body[c])) continue;
-    const RigidBody& body = bodies_[pairs_.body[c]];
-    const Vec3 beside = body.beside(position[pairs_.point[c]]);
-    if (plane_round_edge(body, beside, normal_[c], pairs_.offset[c])) found.insert(pairs_.body[c]);
+    if (gap_round_edge(c, position)) found.insert(pairs_.body[c]);
   }
   return found;
 }
@@ -203,12 +197,7 @@ std::vector<LinearGap> BodyContact::other_sides(std::span<const Vec3> position) 
   std::vector<LinearGap> found;
   for (size_t c = 0; c < pairs_.point.size(); ++c) {
     if (multiplier_[c] <= 0 || slides(c) || normal_[c].isZero(0)) continue;
-    const RigidBody& body = bodies_[pairs_.body[c]];
-    const Vec3 beside = body.beside(position[pairs_.point[c]]);
-    const auto plane = plane_round_edge(body, beside, normal_[c], pairs_.offset[c]);
-    if (!plane) continue;
-    const auto point = static_cast<int32_t>(pairs_.point[c]);
-    found.push_back({c, false, pairs_.area[c], plane->distance, {{point, plane->normal}}, {}});
+    if (const auto gap = gap_round_edge(c, position)) found.push_back(*gap);
   }
   return found;
 }
@@ -216,16 +205,8 @@ std::vector<LinearGap> BodyContact::other_sides(std::span<const Vec3> position) 
 std::vector<LinearGap> BodyContact::ways_out(std::span<const Vec3> position, double overlap) const {
   std::vector<LinearGap> found;
   for (const auto& [first, second] : overlapped(overlap)) {
-    std::optional<LinearGap> nearest;
-    for (const size_t c : {first, second}) {
-      const RigidBody& body = bodies_[pairs_.body[c]];
-      const auto point = static_cast<int32_t>(pairs_.point[c]);
-      const Vec3 beside = body.beside(position[point]);
-      const auto plane = plane_round_edge(body, beside, normal_[c], pairs_.offset[c]);
-      if (plane && (!nearest || plane->distance > nearest->gap))
-        nearest = {c, false, pairs_.area[c], plane->distance, {{point, plane->normal}}, {}};
-    }
-    if (nearest) found.push_back(*nearest);
+    const auto one = gap_round_edge(first, position), other = gap_round_edge(second, position);
+    if (one || other) found.push_back(!other || (one && one->gap >= other->gap) ? *one : *other);
   }
   return found;
 }
@@ -259,15 +240,9 @@ double BodyContact::add_gradient(std::span<const Vec3> position, double scale,
                                  std::span<Vec3> gradient) {
   update_gaps(position);
   double value = 0;
-  for (size_t c = 0; c < multiplier_.size(); ++c)
-    if (multiplier_[c] > 0 && !slides(c))
-      value -= pairs_.area[c] * multiplier_[c] * multiplier_[c] / (2 * stiffness_);
-  for (const size_t c : acting_) {
-    const Pressing now = press(gap_[c], multiplier_[c], stiffness_, slides(c));
-    const double before = slides(c) ? 0 : multiplier_[c] * multiplier_[c] / (2 * stiffness_);
-    value += pairs_.area[c] * (now.value + before);
-    gradient[pairs_.point[c]] -= scale * pairs_.area[c] * now.pressure * normal_[c];
-  }
+  for (size_t c = 0; c < multiplier_.size(); ++c) value += pairs_.area[c] * now(c).value;
+  for (const size_t c : acting_)
+    gradient[pairs_.point[c]] -= scale * pairs_.area[c] * now(c).pressure * normal_[c];
   return value;
 }
 

@@ -140,8 +140,8 @@ void CutFaceContact::link(const Net& own, const Net& other) {
 
 namespace {
 
-/// Newton's step towards the place of a patch that is nearest to `way` beyond its point; parameters
-/// at an end, `least` or `most`, that the nearest place lies beyond stay.
+/// Returns Newton's step towards the place of a patch that is nearest to `offset` beyond its point;
+/// parameters at an end, `minimum` or `maximum`, that the nearest place lies beyond stay.
 template <class Patch>
 Eigen::Vector2d step_to_nearest(const Patch& patch, const Vec3& offset,
                                 const Eigen::Vector2d& where, const Eigen::Vector2d& minimum,

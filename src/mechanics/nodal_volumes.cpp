@@ -283,7 +283,7 @@ void add_nodal_action(const NodalVolumes& nodal, std::span<const Vec3> position,
 
 std::vector<NodalGradient> nodal_gradients(const NodalVolumes& nodal, int64_t owned,
                                            std::span<const Vec3> position) {
-  std::vector<NodalGradient> result(nodal.stiffness.size());
+  std::vector<NodalGradient> result(position.size());
   nodal.for_each_prism([&](int64_t, const std::array<int32_t, 6>& points) {
     const PrismSlope<double> v{PrismEdges<double>(triples(base::pick(position, points)))};
     for (const int32_t p : points)

@@ -116,20 +116,10 @@ double RigidBody::deepest(double at_most) const {
   return std::visit([&](const auto& shape) { return deepest_in(shape, at_most); }, *shape_);
 }
 
-double RigidBody::reach() const {
-  const auto* field = std::get_if<surface::DistanceField>(shape_.get());
-  return field ? field->reach() : std::numeric_limits<double>::infinity();
-}
-
-namespace {
-
-/// The mesh of a body, if it has one.
 const surface::Surface* mesh_of(const model::Model& model, const model::Body& body) {
   return body.bone >= 0 ? &model.bone_surfaces[body.bone]
                         : std::get_if<surface::Surface>(&body.shape);
 }
-
-}  // namespace
 
 std::vector<RigidBody> make_bodies(const model::Model& model) {
   constexpr double min_reach = 6;  // mm, more than tissue that slides keeps away

@@ -100,7 +100,7 @@ class ContactAdder {
 };
 
 /// mm, the 2nd percentile of the thickness of bone that is near the deep end of a column, along the
-/// way from there into the bone; `most` if that is larger.
+/// way from there into the bone; `maximum` if that is larger.
 double thin_bone(const ColumnLayout& layout, double maximum) {
   constexpr double near = 20, start = 0.01, share = 0.02;  // mm, mm, of the rays
   constexpr size_t rays = 1000;
@@ -113,7 +113,7 @@ double thin_bone(const ColumnLayout& layout, double maximum) {
         bone.distance > 10 * start ? bone.point - deep[c] : deep[c] - layout.mesh.points[c];
     const Vec3 direction = into.normalized();
     const auto exit = layout.field.first_hit(bone.point + start * direction, direction, maximum);
-    thickness.push_back(exit ? start + exit->distance : maximum);
+    thickness.push_back(exit ? start + *exit : maximum);
   }
   if (thickness.empty()) return maximum;
   const auto thin =

@@ -10,8 +10,8 @@ namespace repose::model {
 void add_contact(const scene::Scene& scene, const SkinMesh& mesh, const ColumnEnds& ends,
                  Model& model);
 
-/// Returns the spacing of the grids of distances, mm: the scene's, or half the thickness of thin
-/// bone near the tissue, which a coarser grid would miss, but 0.5 mm at least and 1 mm at most.
+/// Returns the spacing of the grids of distances, mm: the scene's, or 0.5 where bones are cut, or
+/// half the thickness of thin bone near the tissue, but 0.5 at least and 0.6 at most.
 double grid_spacing(const scene::Scene& scene, const ColumnLayout& layout);
 
 /// Doubled points, whose pairs are given, touch what the points touched, with half the area each.

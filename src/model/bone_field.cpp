@@ -18,13 +18,13 @@ BoneField::Nearest BoneField::nearest(const Vec3& query) const {
   return best;
 }
 
-std::optional<BoneField::Hit> BoneField::first_hit(const Vec3& origin, const Vec3& direction,
-                                                   double reach) const {
-  std::optional<Hit> best;
-  for (int32_t b = 0; b < size(); ++b)
-    if (const auto hit = trees_[b].first_hit(origin, direction, best ? best->distance : reach))
-      if (!best || hit->distance < best->distance) best = Hit{hit->distance, b};
-  return best;
+std::optional<double> BoneField::first_hit(const Vec3& origin, const Vec3& direction,
+                                           double reach) const {
+  std::optional<double> nearest;
+  for (const surface::DistanceTree& tree : trees_)
+    if (const auto hit = tree.first_hit(origin, direction, nearest.value_or(reach)))
+      nearest = std::min(hit->distance, nearest.value_or(hit->distance));
+  return nearest;
 }
 
 int32_t BoneField::containing(const Vec3& query) const {

@@ -21,12 +21,9 @@ class BoneField {
   /// Closest point of any bone (the first bone wins a tie).
   Nearest nearest(const Vec3& query) const;
 
-  struct Hit {
-    double distance;  ///< mm along the ray
-    int32_t bone;
-  };
-  /// First bone that the ray from `origin` along the unit vector `direction` meets within `reach`.
-  std::optional<Hit> first_hit(const Vec3& origin, const Vec3& direction, double reach) const;
+  /// Returns how far along the unit vector `direction` a ray from `origin` meets the first bone,
+  /// mm, at most `reach`.
+  std::optional<double> first_hit(const Vec3& origin, const Vec3& direction, double reach) const;
 
   double distance(int32_t bone, const Vec3& query) const {
     return trees_[bone].nearest(query).distance;

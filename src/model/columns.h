@@ -20,7 +20,7 @@ struct Columns {
 /// Lays a column from each skin vertex to the bone beneath. The directions are smoothed over half
 /// the depth of the tissue; where columns would cross they are shortened, so that afterwards no
 /// prism of any number of layers is folded (fold.h); with tissue.edge they are bent first.
-/// `nearest` [V] is the nearest bone point of each skin vertex. Throws RefusedPlaces (places.h)
+/// `nearest` [V] is the nearest bone point of each skin vertex. Throws RefusedPlaces (skin_mesh.h)
 /// where that cannot be.
 Columns compute_columns(const SkinMesh& mesh, const BoneField& bones,
                         const std::vector<BoneField::Nearest>& nearest, const scene::Tissue& tissue,

@@ -210,11 +210,9 @@ std::vector<std::array<int64_t, 2>> cut_along(const Cut& cut, Model& model) {
   return pairs;
 }
 
-std::vector<int64_t> make_cuts(const std::vector<Cut>& cuts, bool lips, Model& model) {
-  std::vector<int64_t> doubled;
+void make_cuts(const std::vector<Cut>& cuts, bool lips, Model& model) {
   for (const Cut& cut : cuts)
-    doubled.push_back(cut.lips == lips ? static_cast<int64_t>(cut_along(cut, model).size()) : -1);
-  return doubled;
+    if (cut.lips == lips) cut_along(cut, model);
 }
 
 }  // namespace repose::model

@@ -13,7 +13,7 @@ struct Cone {
   double cosine;  ///< 0.3, or less where the skin is so sharp that little room is left
 };
 
-/// One cone a skin vertex. Throws RefusedPlaces (places.h) where no direction is inward of all
+/// One cone a skin vertex. Throws RefusedPlaces (skin_mesh.h) where no direction is inward of all
 /// triangles around a vertex (a fold of the skin mesh).
 std::vector<Cone> inward_cones(const SkinMesh& mesh, const std::string& skin_name);
 

@@ -19,7 +19,7 @@ std::vector<int64_t> folded_triangles(const SkinMesh& mesh, const std::vector<Ve
                                       const std::vector<double>& thickness);
 
 /// Shortens columns (×0.9 at a time, neighbors with them so that the deep surface stays no steeper
-/// than it was made) until no triangle is folded. Throws RefusedPlaces (places.h) where columns
+/// than it was made) until no triangle is folded. Throws RefusedPlaces (skin_mesh.h) where columns
 /// would become shorter than 0.05 mm.
 void shorten_folded(const SkinMesh& mesh, const std::vector<Vec3>& directions,
                     const std::string& skin_name, std::vector<double>& thickness);

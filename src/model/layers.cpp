@@ -97,9 +97,8 @@ void add_prisms(const SkinMesh& mesh, int64_t layers, Model& model) {
     for (const Triangle& t : mesh.triangles) {
       const int64_t i = t[0] * layers + a, j = t[2] * layers + a, k = t[1] * layers + a;
       model.prisms.points.push_back({i, j, k, i + 1, j + 1, k + 1});
-      Vec3 corner[6];
-      for (int n = 0; n < 6; ++n) corner[n] = model.points.position[model.prisms.points.back()[n]];
-      model.prisms.rest_volume.push_back(prism_volume(corner));
+      model.prisms.rest_volume.push_back(
+          prism_volume(base::pick(model.points.position, model.prisms.points.back()).data()));
     }
 }
 

@@ -9,7 +9,7 @@ namespace repose::model {
 
 /// Refuses a skin and bones that are not where they belong: bounding boxes more than 200 mm apart
 /// (files in different coordinates: the message says which, and whether turning LPS into RAS would
-/// bring them together; InputError), or skin vertices inside bone (RefusedPlaces, places.h).
+/// bring them together; InputError), or skin vertices inside bone (RefusedPlaces, skin_mesh.h).
 void require_same_place(const SkinMesh& mesh, const std::string& skin_name,
                         const std::vector<surface::Surface>& bones, const BoneField& field);
 

@@ -54,7 +54,7 @@ void ColumnTracer::trace(const std::vector<int64_t>& columns, const std::vector<
   for (const int64_t v : columns) {
     const Vec3& from = mesh_.points[v];
     const auto hit = bones_.first_hit(from, directions[v], farthest);
-    reach_.to_bone[v] = hit ? hit->distance : std::numeric_limits<double>::infinity();
+    reach_.to_bone[v] = hit.value_or(std::numeric_limits<double>::infinity());
     const double start = 1e-3 * std::sqrt(mesh_.vertex_area[v]);
     const double skin_distance = to_other_side(skin_, from, directions[v], start, farthest);
     const double deepest = std::min({tissue_.attach_within, skin_distance,

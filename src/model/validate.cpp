@@ -249,10 +249,9 @@ double volume_tolerance(const Vec3 corners[6]) {
 
 void require_volumes(const Model& m, const ArrayCheck& check) {
   for (size_t i = 0; i < m.prisms.points.size(); ++i) {
-    Vec3 corners[6];
-    for (int j = 0; j < 6; ++j) corners[j] = m.points.position[m.prisms.points[i][j]];
-    const double volume = prism_volume(corners), stored = m.prisms.rest_volume[i];
-    if (!(std::abs(volume - stored) <= volume_tolerance(corners)))
+    const std::array<Vec3, 6> corners = corners_of(m, i);
+    const double volume = prism_volume(corners.data()), stored = m.prisms.rest_volume[i];
+    if (!(std::abs(volume - stored) <= volume_tolerance(corners.data())))
       check.refuse("prism/rest_volume",
                    "row {} is {} mm³, but the prism's volume at point/position is {} mm³; write "
                    "that volume, order prism/points so that it is above 0",

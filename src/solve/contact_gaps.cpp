@@ -211,12 +211,12 @@ void ContactGaps::set_multipliers(const std::vector<double>& to) {
 }
 
 void ContactGaps::give_multipliers() {
-  std::vector<double> bodies(objective_.contact().bodies().multipliers().size(), 0.0),
-      cut_faces(objective_.contact().cut_faces().size(), 0.0);
+  discrete::ContactPressures given{
+      std::vector<double>(objective_.contact().bodies().multipliers().size(), 0.0),
+      std::vector<double>(objective_.contact().cut_faces().size(), 0.0)};
   for (size_t k = 0; k < gaps_.size(); ++k)
-    (k < touching_ ? bodies : cut_faces)[gaps_[k].constraint] = state_[k].multiplier;
-  objective_.contact().bodies().set_multipliers(bodies);
-  objective_.contact().cut_faces().set_multipliers(cut_faces);
+    (k < touching_ ? given.bodies : given.cut_faces)[gaps_[k].constraint] = state_[k].multiplier;
+  objective_.contact().set_multipliers(std::move(given));
 }
 
 }  // namespace repose::solve

@@ -11,8 +11,8 @@ class ContactPenalty {
       : objective_(objective), tangent_(tangent) {}
 
   void set_stiffness(double stiffness);  ///< N/mm³; not collective
-  ContactPressures multipliers() const;
-  void set_multipliers(const ContactPressures& to);  ///< those that are missing are 0
+  discrete::ContactPressures multipliers() const { return objective_.contact().multipliers(); }
+  void set_multipliers(const discrete::ContactPressures& to);  ///< those that are missing are 0
   /// Takes the pressures at the objective's last update as multipliers. Not collective.
   void move_multipliers();
   /// Returns by how much pressures at the positions' last update differ from multipliers, over the
@@ -25,9 +25,9 @@ class ContactPenalty {
   discrete::Tangent& tangent_;
 };
 
-/// Gives the pressure of each owned point, N/mm² in the first component, to the constraint of
-/// contact that it is nearest to, as multiplier; all others are 0. Not collective.
-void set_pressures(discrete::Objective& objective, const std::vector<Vec3>& pressure);
+/// Gives the pressure of each owned point, N/mm², to the constraint of contact that it is nearest
+/// to, as multiplier; all others are 0. Not collective.
+void set_pressures(discrete::Objective& objective, const std::vector<double>& pressure);
 
 /// mm, the deepest that a point is inside a body, beyond its offset, or has passed the other side
 /// of a cut, at the objective's last update. Collective.

@@ -32,11 +32,7 @@ bool ContactPrograms::predict(Vec displacement, double load, Vec increment) {
   discrete::Positions& positions = objective_.positions();
   positions.update(displacement);
   objective_.contact().place_bodies();
-  const discrete::Part& part = positions.part();
-  std::vector<Vec3> travel(positions.local().size(), Vec3::Zero());
-  for (size_t i = 0; i < travel.size(); ++i)
-    if (part.unknown[i] < 0)
-      travel[i] = positions.prescribed(static_cast<int64_t>(i), load) - positions.local()[i];
+  const std::vector<Vec3> travel = positions.travel_to(load);
   objective_.contact().round_bodies(true);
   check(VecSet(gradient_, 0));  // it is at rest
   subtract_contact();

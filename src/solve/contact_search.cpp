@@ -18,7 +18,7 @@ ContactSearch::ContactSearch(discrete::Objective& objective, discrete::Tangent& 
 
 std::optional<bool> ContactSearch::predict(Vec displacement, double load, Vec increment) {
   objective_.contact().bodies().restore_released();
-  const ContactPressures before = penalty_.multipliers();
+  const discrete::ContactPressures before = penalty_.multipliers();
   predicted_ = true;
   descent_.stiffen(1);
   const bool found = programs_.predict(displacement, load, increment);

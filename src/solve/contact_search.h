@@ -28,8 +28,10 @@ class ContactSearch : public RestSearch {
   /// By quadratic programs alone, as long as they serve.
   Outcome run_near(Vec displacement, double accuracy) override;
   void find_other(Vec displacement, double accuracy, Outcome& outcome) override;
-  ContactPressures pressures() const override { return penalty_.multipliers(); }
-  void set_pressures(const ContactPressures& to) override { penalty_.set_multipliers(to); }
+  discrete::ContactPressures pressures() const override { return penalty_.multipliers(); }
+  void set_pressures(const discrete::ContactPressures& to) override {
+    penalty_.set_multipliers(to);
+  }
 
  private:
   using End = ContactPrograms::End;

@@ -16,33 +16,30 @@ constexpr double apart = 1;     // mm that what does not press would have to com
 }  // namespace
 
 FrozenContact::FrozenContact(Problem& problem)
-    : problem_(problem), stiffness_(body_contact().stiffness()) {
-  const auto p = body_contact().multipliers(), q = cut_face_contact().multipliers();
-  touch_multipliers_.assign(p.begin(), p.end());
-  wall_multipliers_.assign(q.begin(), q.end());
+    : problem_(problem),
+      stiffness_(problem.objective().contact().stiffness()),
+      multipliers_(problem.objective().contact().multipliers()) {
+  discrete::Contact& contact = problem.objective().contact();
   const auto position = problem.objective().positions().local();
-  body_contact().update_all_gaps(position);
-  cut_face_contact().update_gaps(position);
+  contact.bodies().update_all_gaps(position);
+  contact.cut_faces().update_gaps(position);
   const double stiff = stiffer * stiffness_;
-  const auto frozen = [&](double pressure, double gap) {
-    return pressure != 0 ? pressure + stiff * gap : stiff * (gap - apart);
+  const auto freeze = [&](double& pressure, double gap) {
+    pressure = pressure != 0 ? pressure + stiff * gap : stiff * (gap - apart);
   };
-  std::vector<double> pressing(touch_multipliers_.size()), parting(wall_multipliers_.size());
-  for (size_t c = 0; c < pressing.size(); ++c)
-    pressing[c] = frozen(body_contact().pressure(c), body_contact().gaps()[c]);
-  for (size_t w = 0; w < parting.size(); ++w)
-    parting[w] = frozen(cut_face_contact().pressure(w), cut_face_contact().gap(w));
-  set(stiff, pressing, parting);
+  discrete::ContactPressures frozen = contact.pressures();
+  for (size_t c = 0; c < frozen.bodies.size(); ++c)
+    freeze(frozen.bodies[c], contact.bodies().gaps()[c]);
+  for (size_t w = 0; w < frozen.cut_faces.size(); ++w)
+    freeze(frozen.cut_faces[w], contact.cut_faces().gap(w));
+  set(stiff, frozen);
 }
 
-FrozenContact::~FrozenContact() { set(stiffness_, touch_multipliers_, wall_multipliers_); }
+FrozenContact::~FrozenContact() { set(stiffness_, multipliers_); }
 
-void FrozenContact::set(double stiffness, std::span<const double> pressing,
-                        std::span<const double> parting) {
-  body_contact().set_stiffness(stiffness);
-  cut_face_contact().set_stiffness(stiffness);
-  body_contact().set_multipliers(pressing);
-  cut_face_contact().set_multipliers(parting);
+void FrozenContact::set(double stiffness, const discrete::ContactPressures& multipliers) {
+  problem_.objective().contact().set_stiffness(stiffness);
+  problem_.objective().contact().set_multipliers(multipliers);
   problem_.tangent().forget_contact();
 }
 
@@ -54,7 +51,7 @@ HeldResponse::HeldResponse(Problem& problem, Vec displacement)
       left_(solver_.positions().make_vector()),
       change_(solver_.positions().make_vector()),
       product_(solver_.positions().make_vector()) {
-  gaps_.set_stiffness(problem.objective().contact().bodies().stiffness());
+  gaps_.set_stiffness(problem.objective().contact().stiffness());
   gaps_.linearize(displacement);
   gaps_.choose_active();
   solver_.refresh(displacement);

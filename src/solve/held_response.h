@@ -15,15 +15,11 @@ class FrozenContact {
   FrozenContact(FrozenContact&&) = delete;
 
  private:
-  mechanics::BodyContact& body_contact() { return problem_.objective().contact().bodies(); }
-  mechanics::CutFaceContact& cut_face_contact() {
-    return problem_.objective().contact().cut_faces();
-  }
-  void set(double stiffness, std::span<const double> pressing, std::span<const double> parting);
+  void set(double stiffness, const discrete::ContactPressures& multipliers);
 
   Problem& problem_;
   double stiffness_;
-  std::vector<double> touch_multipliers_, wall_multipliers_;
+  discrete::ContactPressures multipliers_;
 };
 
 /// Solves linear systems with the Hessian at a rest position under the constraint that closed gaps

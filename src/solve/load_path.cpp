@@ -200,8 +200,8 @@ void LoadPath::try_guess(Vec displacement, Vec guess, const OnStep& on_step) {
   const double before = result_.load;
   const int64_t folded_before = inverted(displacement);
   // Those at a near guess are not those at the start of the path.
-  const ContactPressures pressures =
-      settings_.near_guess ? ContactPressures{} : search_.pressures();
+  const discrete::ContactPressures pressures =
+      settings_.near_guess ? discrete::ContactPressures{} : search_.pressures();
   check(VecCopy(guess, trial_));
   objective_.positions().set_load(1);
   Outcome outcome = settings_.near_guess ? search_.run_near(trial_, settings_.accuracy)
@@ -260,7 +260,7 @@ PathOutcome LoadPath::run(Vec displacement, Vec guess, const OnStep& on_step) {
     if (result_.leapt) return result_;
   }
   const base::VecHandle start = positions.make_vector();
-  const ContactPressures at_start = search_.pressures();
+  const discrete::ContactPressures at_start = search_.pressures();
   settle(displacement, on_step);
   if (guess && !settings_.near_guess && result_.last.converged && !result_.last.stopped &&
       result_.load < 1)
@@ -309,10 +309,10 @@ void LoadPath::follow(Vec displacement, double longest, double end, const OnStep
 /// Goes to load 1 from the `start` of the path, in automatic steps of which the last is reported,
 /// as if no others had been requested: linear solvers and contact are reset first. Where they
 /// fail, the path continues from `displacement`, which the requested steps have reached.
-void LoadPath::follow_again(Vec start, const ContactPressures& at_start, Vec displacement,
+void LoadPath::follow_again(Vec start, const discrete::ContactPressures& at_start, Vec displacement,
                             const OnStep& on_step) {
   const Stopwatch watch;
-  const ContactPressures reached_pressures = search_.pressures();
+  const discrete::ContactPressures reached_pressures = search_.pressures();
   const PathOutcome reached = result_;
   discrete::Positions& positions = objective_.positions();
   problem_.reset();
@@ -343,26 +343,19 @@ void LoadPath::follow_again(Vec start, const ContactPressures& at_start, Vec dis
   follow(displacement, requested_step(), 1, on_step);
 }
 
-using base::check;
-
 Predictor::Predictor(discrete::Objective& objective, linear::TangentSolver& solver)
     : objective_(objective), solver_(solver), force_(objective.positions().make_vector()) {}
 
 bool Predictor::predict(Vec displacement, double load, Vec increment) {
   discrete::Positions& positions = objective_.positions();
   positions.update(displacement);
-  const discrete::Part& part = positions.part();
-  std::vector<Vec3> direction(positions.local().size(), Vec3::Zero());
-  for (size_t i = 0; i < direction.size(); ++i)
-    if (part.unknown[i] < 0)
-      direction[i] = positions.prescribed(static_cast<int64_t>(i), load) - positions.local()[i];
-  objective_.hessian_action(direction, force_);
+  objective_.hessian_action(positions.travel_to(load), force_);
   objective_.add_carried(load, force_);
   check(VecScale(force_, -1));
   check(VecSet(increment, 0));
   // A weak preconditioner's norm does not see smooth errors: after 1e-2 of it an increment can miss
   // by more than the path trusts, and steps are halved for nothing.
-  const double close = part.solid ? 1e-2 : 1e-5;
+  const double close = positions.part().solid ? 1e-2 : 1e-5;
   bool convex = solver_.solve(displacement, force_, increment, close);
   // Where iterations ran out, the preconditioner is worn out and the next solve renews it.
   if (convex && !solver_.finished()) convex = solver_.solve(displacement, force_, increment, close);

@@ -105,8 +105,8 @@ Outcome OtherRestSearch::settle(Vec displacement, double accuracy) {
 /// Searches for the rest position that quadratic programs lead to from start_, without rounded
 /// bodies. Where it is another one, `displacement` becomes that of less energy, and `outcome`
 /// states the distance to the other; the multipliers at `displacement` are `here`. Collective.
-void OtherRestSearch::consider(Vec displacement, const ContactPressures& here, double accuracy,
-                               Outcome& outcome) {
+void OtherRestSearch::consider(Vec displacement, const discrete::ContactPressures& here,
+                               double accuracy, Outcome& outcome) {
   int64_t iterations = 0;
   const End end = programs_.run(start_, accuracy, iterations);
   const bool less = is_less(programs_.evaluate(start_), outcome.objective);
@@ -172,7 +172,7 @@ bool OtherRestSearch::change_sides(Vec displacement, double accuracy, std::set<s
   size_t next = 0;
   bool changed = false;
   for (int failed = 0; failed < max_failed; ++failed) {
-    const ContactPressures here = penalty_.multipliers();
+    const discrete::ContactPressures here = penalty_.multipliers();
     const double softness = next < sides.size() ? sides[next].softness : none;
     const auto first = base::extreme_over_ranks(positions.comm(), softness, MPI_MINLOC);
     if (first.value == none) break;
@@ -209,7 +209,7 @@ bool OtherRestSearch::descend(Vec displacement, double accuracy, Outcome& outcom
 void OtherRestSearch::try_candidates(Vec displacement, double accuracy, Outcome& outcome) {
   constexpr double hardly = 0.015;  // of the energy
   for (const Candidate& candidate : std::exchange(candidates_, {})) {
-    const ContactPressures here = penalty_.multipliers();
+    const discrete::ContactPressures here = penalty_.multipliers();
     penalty_.set_multipliers(candidate.pressures);
     check(VecCopy(candidate.displacement, start_));
     Outcome there;
@@ -231,7 +231,7 @@ void OtherRestSearch::find(Vec displacement, double accuracy, Outcome& outcome) 
   if (bodies.empty()) return;
   const int64_t evaluated = objective_.evaluations();
   for (const bool slack : {false, true}) {
-    const ContactPressures here = penalty_.multipliers();
+    const discrete::ContactPressures here = penalty_.multipliers();
     check(VecCopy(prediction_, start_));
     penalty_.set_multipliers(at_prediction_);
     if (slack) descent_.slacken(start_);

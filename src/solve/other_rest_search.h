@@ -29,12 +29,13 @@ class OtherRestSearch {
   using End = ContactPrograms::End;
   struct Candidate {  ///< another rest position that programs reached
     base::VecHandle displacement;
-    ContactPressures pressures;
+    discrete::ContactPressures pressures;
   };
   std::vector<int32_t> touched_near_edges(Vec displacement);
   int64_t pierced(Vec state);
   Outcome settle(Vec displacement, double accuracy);
-  void consider(Vec displacement, const ContactPressures& here, double accuracy, Outcome& outcome);
+  void consider(Vec displacement, const discrete::ContactPressures& here, double accuracy,
+                Outcome& outcome);
   End change_side(const OtherSide* side, Vec displacement, double accuracy);
   bool change_sides(Vec displacement, double accuracy, std::set<size_t>& tried, Outcome& outcome);
   bool descend(Vec displacement, double accuracy, Outcome& outcome);
@@ -50,7 +51,7 @@ class OtherRestSearch {
   ContactPrograms& programs_;
   ContactDescent& descent_;
   int64_t evaluations_ = 0;
-  ContactPressures at_prediction_;
+  discrete::ContactPressures at_prediction_;
   base::VecHandle prediction_, start_;
   std::vector<Candidate> candidates_;
 };

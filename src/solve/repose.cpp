@@ -343,9 +343,7 @@ void begin_near(const Start& start, const discrete::NaturalRows& natural, Vec gu
   positions.set_load(1);
   positions.update(guess);
   objective.contact().place_bodies();
-  std::vector<Vec3> rows;
-  for (const double p : start.pressure) rows.emplace_back(p, 0, 0);
-  set_pressures(objective, natural.owned(rows));
+  set_pressures(objective, natural.owned(start.pressure));
 }
 
 void end_stage(const Settings& settings, const char* name) {

@@ -42,11 +42,9 @@ void bring_to_contact(const discrete::NaturalRows& natural, const RestState& res
                       Problem& problem) {
   discrete::Objective& objective = problem.objective();
   const MPI_Comm comm = objective.positions().comm();
-  std::vector<Vec3> rows;
-  for (const double p : rest.pressure) rows.emplace_back(p, 0, 0);
-  if (base::rank(comm) == 0) rows.resize(rest.position.size(), Vec3::Zero());
-  const std::vector<Vec3> pressure = natural.owned(base::scatter(comm, rows));
-  set_pressures(objective, pressure);
+  std::vector<double> pressure = rest.pressure;
+  if (base::rank(comm) == 0) pressure.resize(rest.position.size(), 0.0);
+  set_pressures(objective, natural.owned(base::scatter(comm, pressure)));
   problem.tangent().invalidate();
 }
 

@@ -78,10 +78,6 @@ const std::vector<SupportedTypes>& supported_types() {
   return table;
 }
 
-void require_supported_types() {
-  for (const auto& [name, value] : base::petsc_options()) require_supported(name, value);
-}
-
 const std::vector<SupportedNumbers>& supported_numbers() {
   using base::Range;
   static const std::vector<SupportedNumbers> table{
@@ -96,13 +92,17 @@ const std::vector<SupportedNumbers>& supported_numbers() {
       {{"ksp_divtol", "tao_*_ksp_divtol"}, Range::above(1)},
       {{"ksp_max_it", "tao_*_ksp_max_it"}, Range::at_least(1), true},
       {{"pc_renewal_price"}, Range::at_least(-1)},
+      {{"tao_lmvm_renewal_price"}, Range::at_least(1)},
       {{"eps_tol"}, {.min = 0, .max = 1, .min_excluded = true}},
       {{"eps_max_it", "eps_nev"}, Range::at_least(1), true}};
   return table;
 }
 
-void require_supported_numbers() {
-  for (const auto& [name, value] : base::petsc_options()) require_number(name, value);
+void require_supported_options() {
+  for (const auto& [name, value] : base::petsc_options()) {
+    require_supported(name, value);
+    require_number(name, value);
+  }
 }
 
 std::string given_search_options() {

@@ -56,39 +56,31 @@ std::string reason_text(TaoConvergedReason reason) {
 
 }  // namespace
 
-/// The C functions TAO calls. Nothing is thrown through C: an exception is kept for run().
+/// The C functions TAO calls.
 struct TaoSearch::Callbacks {
   template <class Work>
-  static PetscErrorCode guarded(void* context, Work&& work) {
-    auto* self = static_cast<TaoSearch*>(context);
-    try {
-      work(*self);
-      return PETSC_SUCCESS;
-    } catch (...) {
-      self->thrown_ = std::current_exception();
-      return PETSC_ERR_USER;
-    }
+  static PetscErrorCode call(void* me, Work&& work) {
+    return base::run_callback([&] { work(*static_cast<TaoSearch*>(me)); });
   }
 
   static PetscErrorCode value_and_gradient(Tao, Vec x, PetscReal* value, Vec gradient, void* me) {
-    return guarded(me, [&](TaoSearch& self) { *value = self.function_.evaluate(x, gradient); });
+    return call(me, [&](TaoSearch& self) { *value = self.function_.evaluate(x, gradient); });
   }
 
   /// TAO's own way to the value alone leaves its vector behind where an evaluation fails.
   static PetscErrorCode value(Tao, Vec x, PetscReal* value, void* me) {
-    return guarded(me,
-                   [&](TaoSearch& self) { *value = self.function_.evaluate(x, self.gradient_); });
+    return call(me, [&](TaoSearch& self) { *value = self.function_.evaluate(x, self.gradient_); });
   }
 
   static PetscErrorCode hessian(Tao, Vec x, Mat, Mat, void* me) {
-    return guarded(me, [&](TaoSearch& self) {
+    return call(me, [&](TaoSearch& self) {
       self.solver_.prepare(x);
       self.set_forcing();
     });
   }
 
   static PetscErrorCode converged(Tao tao, void* me) {
-    return guarded(me, [&](TaoSearch& self) {
+    return call(me, [&](TaoSearch& self) {
       PetscInt iteration = 0;
       PetscReal value = 0, length = 0;
       check(TaoGetSolutionStatus(tao, &iteration, &value, nullptr, nullptr, &length, nullptr));
@@ -111,8 +103,7 @@ struct TaoSearch::Callbacks {
 
 TaoSearch::TaoSearch(discrete::Function& function, linear::TangentSolver& solver, TaoType type)
     : function_(function), solver_(solver), gradient_(function.positions().make_vector()) {
-  require_supported_types();
-  require_supported_numbers();
+  require_supported_options();
   check(TaoCreate(function_.positions().comm(), tao_.out()));
   check(TaoSetType(tao_, type));
   check(TaoSetObjective(tao_, Callbacks::value, this));
@@ -191,7 +182,6 @@ bool TaoSearch::should_restart(int64_t iterations) const {
 
 int64_t TaoSearch::run(Vec displacement, bool near, Ends ends) {
   ends_ = std::move(ends);
-  thrown_ = nullptr;
   before_ = 0;
   check(TaoSetSolution(tao_, displacement));
   PetscInt iterations = 0;
@@ -201,9 +191,7 @@ int64_t TaoSearch::run(Vec displacement, bool near, Ends ends) {
     else if (initial_)
       initial_->renew(displacement);
     slowed_ = near = false;
-    const PetscErrorCode code = TaoSolve(tao_);
-    if (thrown_) std::rethrow_exception(thrown_);
-    check(code);
+    check(TaoSolve(tao_));
     check(TaoGetIterationNumber(tao_, &iterations));
     before_ += iterations;
   } while (should_restart(iterations));

@@ -1,7 +1,6 @@
 #pragma once
 #include <petsctao.h>
 
-#include <exception>
 #include <functional>
 #include <memory>
 
@@ -54,7 +53,6 @@ class TaoSearch {
   int64_t before_ = 0;                         // iterations before TAO's present ones
   Ends ends_;
   base::VecHandle gradient_;  // where the value alone is requested
-  std::exception_ptr thrown_;
 };
 
 }  // namespace repose::solve

@@ -23,8 +23,24 @@ class PetscError : public InternalError {
   using InternalError::InternalError;
 };
 
-/// Throws PetscError with PETSc's own text when `code` is not zero. Not collective.
+/// Where `code` is not zero, throws what run_callback() caught, or else PetscError with PETSc's own
+/// text. Not collective.
 void check(PetscErrorCode code);
+
+/// Keeps the exception that is handled for the next check() of an error.
+void keep_exception();
+
+/// Returns the error code for PETSc of a function that it calls: no exception passes through C.
+template <class Work>
+PetscErrorCode run_callback(Work&& work) {
+  try {
+    work();
+    return PETSC_SUCCESS;
+  } catch (...) {
+    keep_exception();
+    return PETSC_ERR_USER;
+  }
+}
 
 /// Checks the result of PETSc's …SetFromOptions, whose errors are the user's: throws InputError.
 void check_options(PetscErrorCode code);

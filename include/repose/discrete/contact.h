@@ -1,8 +1,15 @@
 #pragma once
+#include <vector>
+
 #include "repose/discrete/positions.h"
 #include "repose/mechanics/cut_face_contact.h"
 
 namespace repose::discrete {
+
+/// Pressures of contact of this rank's points, N/mm², a number a constraint.
+struct ContactPressures {
+  std::vector<double> bodies, cut_faces;
+};
 
 /// Contact of the points that this rank owns: with bodies, which move with the positions' load, and
 /// between the faces of cuts. Members are not collective unless said otherwise.
@@ -12,10 +19,16 @@ class Contact {
 
   mechanics::BodyContact& bodies() { return bodies_; }
   mechanics::CutFaceContact& cut_faces() { return cut_faces_; }
-  const mechanics::CutFaceContact& cut_faces() const { return cut_faces_; }
   /// Rounds the edges of bodies whose distances are read from grids, or no more. The multipliers
   /// are kept.
   void round_bodies(bool rounded);
+  double stiffness() const { return bodies_.stiffness(); }  ///< N/mm³
+  void set_stiffness(double stiffness);
+  ContactPressures multipliers() const;
+  void set_multipliers(ContactPressures to);  ///< those that are missing are 0
+  /// Evaluates the gaps that may act at the positions' state, of bodies where they are placed.
+  void update_gaps();
+  ContactPressures pressures() const;  ///< at the latest update
   /// Takes the bodies to where they are at the positions' load.
   void place_bodies();
   /// Goes back to the state after construction.
@@ -29,9 +42,8 @@ class Contact {
   void for_each_block(bool exact, Visit&& visit) {
     if (!positions_.part().contact) return;
     place_bodies();
-    bodies_.update_gaps(positions_.local());
+    update_gaps();
     bodies_.for_each_block(exact, [&](int64_t p, const Mat3& block) { visit(p, p, block); });
-    cut_faces_.update_gaps(positions_.local());
     cut_faces_.for_each_block(exact, visit);
   }
 

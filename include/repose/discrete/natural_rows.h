@@ -31,6 +31,7 @@ class NaturalRows {
   model::PointField field(const std::string& name, std::span<const Vec3> values) const;
   /// [owned points] the values of this rank's points, of which `slab` has this rank's natural rows.
   std::vector<Vec3> owned(const std::vector<Vec3>& slab) const;
+  std::vector<double> owned(const std::vector<double>& slab) const;
   /// Returns values at any rows of the whole model's `total`, of which `slab` has this rank's.
   std::vector<double> at_rows(const std::vector<int64_t>& rows, int64_t total,
                               const std::vector<double>& slab) const;

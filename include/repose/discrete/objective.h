@@ -28,7 +28,7 @@ class Objective : public Function {
   /// Not collective.
   std::vector<Block> term_blocks(bool exact) const;
   std::vector<Block> contact_blocks(bool exact);
-  /// Pairs of different points that such blocks may couple, ascending.
+  /// Pairs of different points that the preconditioner couples by such blocks, ascending.
   std::span<const std::array<int32_t, 2>> links() const { return links_; }
   static void add_blocks(std::span<const Block> blocks, std::span<const Vec3> direction,
                          std::span<Vec3> product);
@@ -53,7 +53,6 @@ class Objective : public Function {
   void set_volume_weight(double weight) { weights_.volume_weight = weight; }
   const mechanics::Loops& loops() const { return loops_; }
   bool averages_volumes() const { return averages_volumes_; }  ///< on some rank
-  mechanics::PrismLoop& prisms() { return loops_.prisms; }
 
  private:
   double value_and_gradient(Vec displacement, Vec gradient) override;

@@ -22,8 +22,6 @@ class Positions {
   void set_motion(int32_t bone, const scene::RigidMotion& motion);
   /// Number of changes of load or motions so far.
   int64_t revision() const { return revision_; }
-  /// Where fixed point `local_row` is at a load.
-  Vec3 prescribed(int64_t local_row, double load) const;
 
   /// 4×4 matrix that takes a bone from load 0 to the load.
   const Mat4& bone_matrix(int32_t bone) const { return poses_[bone]; }
@@ -39,6 +37,10 @@ class Positions {
   void update(Vec displacement);
   /// [local points] mm, as of the last update and load.
   std::span<const Vec3> local() const { return local_; }
+
+  /// Returns the way of each fixed point from where it is to its place at a load, mm, 0 for
+  /// unknowns [local points].
+  std::vector<Vec3> travel_to(double load) const;
 
   /// A zero vector of unknowns: blocks of 3, this rank's soft-tissue points in local order.
   base::VecHandle make_vector() const;

@@ -26,12 +26,12 @@ class TangentEntries {
  private:
   /// The block columns of this rank's rows in one part of a matrix, in compressed rows.
   struct BlockRows {
-    std::vector<int32_t> begin;   // [owned unknowns + 1]
+    std::vector<PetscInt> begin;  // [owned unknowns + 1]
     std::vector<int32_t> column;  // global block numbers, ascending in each row
   };
   // Where a block goes: index of its first entry among the values of the diagonal part, or, beyond
   // their end, of the off-diagonal part; −1 for a block that is not in this rank's rows.
-  using Slot = int32_t;
+  using Slot = PetscInt;
   using PairSlots = std::array<Slot, 4>;  // ii ij ji jj
 
   void make_pattern();

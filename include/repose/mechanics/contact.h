@@ -1,6 +1,7 @@
 #pragma once
 #include <algorithm>
 #include <limits>
+#include <optional>
 #include <set>
 #include <span>
 #include <utility>
@@ -51,7 +52,7 @@ void visit_products(const LinearGap::Gradient& g, double weight, Visit&& visit) 
 class BodyContact {
  public:
   BodyContact() = default;
-  /// `touches` with local point numbers.
+  /// `pairs` with local point numbers.
   BodyContact(const model::ContactPairs& pairs, double stiffness, std::vector<RigidBody> bodies);
 
   /// Forgets all positions and multipliers.
@@ -133,6 +134,7 @@ class BodyContact {
   Pressing now(size_t c) const {
     return released(c) ? Pressing{} : press(gap_[c], multiplier_[c], stiffness_, slides(c));
   }
+  std::optional<LinearGap> gap_round_edge(size_t c, std::span<const Vec3> position) const;
   void measure(size_t c, const Vec3& beside);
   bool measure_within(double reach, double smoothed_to, size_t c, const Vec3& beside);
   void set(size_t c, const Vec3& beside, const surface::Distance& distance);

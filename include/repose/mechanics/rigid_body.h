@@ -53,8 +53,6 @@ class RigidBody {
   /// Returns the depth of the deepest place inside, mm, at most `at_most`. That of a mesh is found
   /// along the normals of its triangles.
   double deepest(double at_most) const;
-  /// Up to this the distance is known, mm.
-  double reach() const;
 
  private:
   std::shared_ptr<const Shape> shape_;
@@ -63,6 +61,9 @@ class RigidBody {
   Mat3 rotation_ = Mat3::Identity();
   Vec3 shift_ = Vec3::Zero();
 };
+
+/// Returns the mesh of a body of a model's contact, null for closed forms.
+const surface::Surface* mesh_of(const model::Model& model, const model::Body& body);
 
 /// Returns the bodies of a model's contact at load 0. The distances to meshes are known up to 6 mm,
 /// and 4 spacings, outside them.
@@ -81,7 +82,7 @@ void place_bodies(double load, BoneMatrix&& bone_matrix, std::vector<RigidBody>&
   }
 }
 
-/// [C] mm, Touches::offset of the contact of a model, whose bodies are at load 0.
+/// Returns [C] mm, ContactPairs::offset of the contact of a model, whose bodies are at load 0.
 std::vector<double> contact_offsets(const model::Model& model,
                                     const std::vector<RigidBody>& bodies);
 

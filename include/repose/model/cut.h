@@ -48,9 +48,8 @@ std::vector<Cut> insert_paths(const std::vector<scene::Incision>& incisions,
 /// made around the whole path. Throws InternalError where the columns are no path of edges.
 std::vector<std::array<int64_t, 2>> cut_along(const Cut& cut, Model& model);
 
-/// Makes the cuts of the lips, or all others, in their order (cut_along). Returns of each of `cuts`
-/// the number of points that it doubled, −1 where it was not to be made.
-std::vector<int64_t> make_cuts(const std::vector<Cut>& cuts, bool lips, Model& model);
+/// Makes the cuts of the lips, or all others, in their order (cut_along).
+void make_cuts(const std::vector<Cut>& cuts, bool lips, Model& model);
 
 /// Elements removed with torn springs.
 struct Tear {

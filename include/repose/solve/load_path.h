@@ -73,11 +73,11 @@ class LoadPath {
 
  private:
   struct Attempt {
-    ContactPressures before;  // of the step
-    int64_t begun = 0;        // evaluations before it
-    int64_t inverted = 0;     // prisms, before it
-    bool predicted = false;   // trial_ began at the predicted end, increment_
-    double expected = 0;      // mm, largest predicted displacement
+    discrete::ContactPressures before;  // of the step
+    int64_t begun = 0;                  // evaluations before it
+    int64_t inverted = 0;               // prisms, before it
+    bool predicted = false;             // trial_ began at the predicted end, increment_
+    double expected = 0;                // mm, largest predicted displacement
     Outcome outcome = {};
     int64_t evaluations = 0;  // of the step
     bool folded = false;      // more prisms are inverted than before
@@ -95,7 +95,7 @@ class LoadPath {
   bool follows(const Attempt& now, const std::optional<Attempt>& coarser) const;
   void settle(Vec displacement, const OnStep& on_step);
   void follow(Vec displacement, double longest, double end, const OnStep& on_step);
-  void follow_again(Vec start, const ContactPressures& at_start, Vec displacement,
+  void follow_again(Vec start, const discrete::ContactPressures& at_start, Vec displacement,
                     const OnStep& on_step);
   void try_guess(Vec displacement, Vec guess, const OnStep& on_step);
   void accept(const Outcome& outcome, double load, Vec displacement);

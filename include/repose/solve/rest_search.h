@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "repose/base/geometry.h"
+#include "repose/discrete/contact.h"
 
 namespace repose::solve {
 
@@ -30,11 +31,6 @@ struct OtherRest {
   Vec3 place = Vec3::Zero();  ///< mm, where on the initial skin
   std::vector<Vec3> displacement = {};  ///< mm, [owned points] of this rank
   std::vector<int32_t> bodies = {};     ///< near edges of which points pressed, ascending
-};
-
-/// Multipliers of contact between two searches, N/mm².
-struct ContactPressures {
-  std::vector<double> bodies, cut_faces;  ///< this rank's points at bodies and of cut faces
 };
 
 /// Outcome of a search for the rest position at one load.
@@ -77,9 +73,9 @@ class RestSearch {
   /// distance to another. Collective.
   virtual void find_other(Vec /*displacement*/, double /*accuracy*/, Outcome& /*outcome*/) {}
   /// Returns the multipliers of contact with which the next search begins.
-  virtual ContactPressures pressures() const { return {}; }
+  virtual discrete::ContactPressures pressures() const { return {}; }
   /// Sets the multipliers of contact, as where a step is rejected; empty ones are 0. Collective.
-  virtual void set_pressures(const ContactPressures& /*to*/) {}
+  virtual void set_pressures(const discrete::ContactPressures& /*to*/) {}
 };
 
 }  // namespace repose::solve

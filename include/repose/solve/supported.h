@@ -17,10 +17,6 @@ struct SupportedTypes {
 
 const std::vector<SupportedTypes>& supported_types();
 
-/// Refuses, with the allowed values, a type in PETSc's options that is not in the table
-/// (InputError). Others crash, stop with an error or return a wrong answer. Not collective.
-void require_supported_types();
-
 /// Allowed values of a PETSc option that is a number.
 struct SupportedNumbers {
   std::vector<std::string> options;  ///< without their dash; a * stands for the name of a method
@@ -30,9 +26,10 @@ struct SupportedNumbers {
 
 const std::vector<SupportedNumbers>& supported_numbers();
 
-/// Refuses, with the allowed range, a number in PETSc's options that is not in the table, and nan
-/// for any option (InputError): PETSc takes these without a word. Not collective.
-void require_supported_numbers();
+/// Refuses, with the allowed ones, a type or number in PETSc's options that is not in the tables,
+/// and nan for any option (InputError): such types crash, stop with an error or return a wrong
+/// answer, and PETSc takes such numbers without a word. Not collective.
+void require_supported_options();
 
 /// The options of PETSc that choose a type or a number of the search, as "-ksp_max_it 1, -pc_type
 /// none"; empty where there are none. Not collective.

@@ -39,7 +39,6 @@ class DistanceField {
   double value(const Vec3& point) const;
   /// With derivatives; these are 0 beyond `reach`.
   Distance sample(const Vec3& point) const;
-  double reach() const { return grid_.reach; }
   const Surface& surface() const { return surface_; }
   /// A lower bound of value(point), mm, that costs one exact distance or none: a rough one where it
   /// is at least `enough`.

@@ -120,4 +120,11 @@ TEST(SpringsWithoutLength, PushNowhere) {
 }
 
 }  // namespace curvature_test
+TEST(NodalGradients, ARankWithoutPrismsHasNoneAtItsPoints) {
+  const std::vector<Vec3> points(3, Vec3::Zero());
+  const auto gradients = mechanics::nodal_gradients(mechanics::NodalVolumes{}, 3, points);
+  ASSERT_EQ(gradients.size(), points.size());
+  for (const auto& gradient : gradients) EXPECT_TRUE(gradient.points.empty());
+}
+
 }  // namespace repose::mechanics

@@ -44,7 +44,7 @@ class Scripted : public solve::RestSearch {
       problem_.function().evaluate(displacement, increment);
     return outcome;
   }
-  void set_pressures(const solve::ContactPressures&) override { ++rejected; }
+  void set_pressures(const discrete::ContactPressures&) override { ++rejected; }
 
  private:
   solve::Problem& problem_;

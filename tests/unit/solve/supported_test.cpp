@@ -41,9 +41,9 @@ void expect_table(const char* option, PetscFunctionList list) {
   for (const std::string& type : all) {
     const base::ScopedOption chosen(option, type);
     if (std::find(allowed.begin(), allowed.end(), type) != allowed.end())
-      EXPECT_NO_THROW(require_supported_types()) << option << ' ' << type;
+      EXPECT_NO_THROW(require_supported_options()) << option << ' ' << type;
     else
-      EXPECT_THROW(require_supported_types(), base::InputError) << option << ' ' << type;
+      EXPECT_THROW(require_supported_options(), base::InputError) << option << ' ' << type;
   }
   for (const std::string& type : allowed)  // PETSc is built with ML or without
     EXPECT_TRUE(type == "columns" || type == "ml" ||
@@ -65,7 +65,7 @@ TEST(SupportedTypes, EveryTypeOfPetscIsTakenOrRefused) {
 TEST(SupportedTypes, ARefusalNamesTheAllowedValues) {
   const base::ScopedOption chosen("-tao_ntr_ksp_type", "gltr");
   try {
-    require_supported_types();
+    require_supported_options();
     FAIL();
   } catch (const base::InputError& error) {
     const std::string text = error.what();
@@ -76,19 +76,19 @@ TEST(SupportedTypes, ARefusalNamesTheAllowedValues) {
 
 TEST(SupportedTypes, APreconditionerOfAMethodIsRefused) {
   const base::ScopedOption chosen("-tao_bnk_pc_type", "jacobi");
-  EXPECT_THROW(require_supported_types(), base::InputError);
+  EXPECT_THROW(require_supported_options(), base::InputError);
 }
 
 TEST(SupportedTypes, OtherPrefixesAreLeftAlone) {
   const base::ScopedOption levels("-mg_levels_ksp_type", "gmres"), sub("-sub_pc_type", "ilu");
-  EXPECT_NO_THROW(require_supported_types());
+  EXPECT_NO_THROW(require_supported_options());
 }
 
 /// The message of a refusal, or "accepted".
 std::string refusal_of(const char* option, const std::string& value) {
   const base::ScopedOption chosen(option, value);
   try {
-    require_supported_numbers();
+    require_supported_options();
   } catch (const base::InputError& error) {
     return error.what();
   }
@@ -103,6 +103,8 @@ TEST(SupportedNumbers, ValuesOutOfRangeAreRefusedWithTheRange) {
   EXPECT_EQ(refusal_of("-tao_ntr_ksp_rtol", "1"),
             "-tao_ntr_ksp_rtol 1: must be a number, > 0 and ≤ 0.9");
   EXPECT_EQ(refusal_of("-ksp_divtol", "1"), "-ksp_divtol 1: must be a number, > 1");
+  EXPECT_EQ(refusal_of("-tao_lmvm_renewal_price", "-5"),
+            "-tao_lmvm_renewal_price -5: must be a number, ≥ 1");
   EXPECT_EQ(refusal_of("-tao_max_it", "2.5"), "-tao_max_it 2.5: must be a whole number, ≥ -1");
   for (const char* value : {"0", "1e-3", ".5"})
     EXPECT_EQ(refusal_of("-tao_gatol", value), "accepted");
