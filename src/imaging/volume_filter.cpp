@@ -39,7 +39,8 @@ double otsu_level(const Volume& volume) {
   const double width = (static_cast<double>(greatest) - minimum) / bins;
   std::array<double, bins> count{};
   for (const float value : volume.values)
-    ++count[std::min(bins - 1, static_cast<int>((value - minimum) / width))];
+    if (value != beyond_volume)
+      ++count[std::min(bins - 1, static_cast<int>((value - minimum) / width))];
   double all = 0, moment = 0, below = 0, moment_below = 0, maximum = -1;
   int split = 0;
   for (int b = 0; b < bins; ++b) {

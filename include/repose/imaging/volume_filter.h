@@ -14,7 +14,8 @@ std::array<float, 2> value_range(const Volume& volume);
 std::string describe_values(const Volume& volume);
 
 /// The threshold that parts the values into two classes of greatest between-class variance (Otsu,
-/// 1979), from a histogram of 1024 bins. Throws InputError where all values are equal.
+/// 1979), from a histogram of 1024 bins. Voxels of beyond_volume do not count. Throws InputError
+/// where all values are equal.
 double otsu_level(const Volume& volume);
 
 /// The voxels from `begin` to before `end` along each axis.

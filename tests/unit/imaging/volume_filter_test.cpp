@@ -23,6 +23,19 @@ TEST(VolumeFilter, otsu_parts_two_heaps) {
   EXPECT_NE(refusal([&] { otsu_level(flat); }).find("every value is 4"), std::string::npos);
 }
 
+TEST(VolumeFilter, otsu_takes_the_voxels_in_an_oblique_box_only) {
+  const Mat3 turned = Eigen::AngleAxisd(0.35, Vec3::UnitZ()).toRotationMatrix();
+  const Volume volume = sampled(30, turned, [](const Vec3& p) {
+    return p.norm() < 4 ? 300 : p.cwiseAbs().maxCoeff() < 7 ? -900 : 3000;
+  });
+  Extraction requested;
+  requested.otsu = true;
+  requested.box = {Vec3::Constant(-6), Vec3::Constant(6)};
+  const double level = extract(volume, requested).level;
+  EXPECT_GT(level, -900);
+  EXPECT_LT(level, 300);
+}
+
 TEST(VolumeFilter, crop_keeps_every_voxel_in_its_place) {
   const Mat3 axes = Vec3(1, 2, 3).asDiagonal();
   const auto code = [](const Vec3& p) { return p.x() + 100 * p.y() + 10000 * p.z(); };
