@@ -250,14 +250,24 @@ std::map<std::string, Vec3> landmarks_by_name(const std::filesystem::path& file)
   return named;
 }
 
+namespace {
+
+std::string json_text(const std::string& text) {
+  YAML::Emitter emitter;
+  emitter << YAML::EscapeAsJson << YAML::DoubleQuoted << text;
+  return emitter.c_str();
+}
+
+}  // namespace
+
 std::string markups_text(const std::map<std::string, Vec3>& landmarks) {
   std::string points;
   int number = 0;
   for (const auto& [name, at] : landmarks)
     points += fmt::format(
-        "{}        {{\"id\": \"{}\", \"label\": \"{}\", \"position\": [{:.4f}, {:.4f}, {:.4f}], "
+        "{}        {{\"id\": \"{}\", \"label\": {}, \"position\": [{:.4f}, {:.4f}, {:.4f}], "
         "\"positionStatus\": \"defined\"}}",
-        points.empty() ? "" : ",\n", ++number, name, at.x(), at.y(), at.z());
+        points.empty() ? "" : ",\n", ++number, json_text(name), at.x(), at.y(), at.z());
   return "{\n"
          "  \"@schema\": \"https://raw.githubusercontent.com/slicer/slicer/master/Modules/Loadable/"
          "Markups/Resources/Schema/markups-schema-v1.0.3.json#\",\n"

@@ -38,7 +38,7 @@ TEST(LandmarkNames, TwoPlacesOfOneAreRefused) {
 
 TEST(LandmarkNames, WrittenOnesAreReadAgain) {
   const Folder folder;
-  const Landmarks written{{"b_point", {1, -2.5, 3}}, {"wart", {4, 5, 6}}};
+  const Landmarks written{{"b_point", {1, -2.5, 3}}, {"scar \"old\" \\\t\x01", {4, 5, 6}}};
   EXPECT_EQ(landmarks_by_name(folder.write("a.mrk.json", markups_text(written))), written);
 }
 
