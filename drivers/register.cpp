@@ -57,37 +57,22 @@ struct Pairs {
   std::vector<std::string> names;
   std::vector<Vec3> moving, fixed;
 
-  void add(const scene::Landmark& a, const scene::Landmark& b) {
-    names.push_back(a.name);
-    moving.push_back(a.position);
-    fixed.push_back(b.position);
+  void add(const std::string& name, const Vec3& from, const Vec3& to) {
+    names.push_back(name);
+    moving.push_back(from);
+    fixed.push_back(to);
   }
 };
 
-const scene::Landmark* find(const std::vector<scene::Landmark>& landmarks, const std::string& name,
-                            const std::string& file) {
-  const scene::Landmark* found = nullptr;
-  for (const auto& landmark : landmarks) {
-    if (landmark.name != name) continue;
-    if (found)
-      base::refuse("{}: landmark {} comes twice; rename one, or use -match order", file,
-                   base::quote(name));
-    found = &landmark;
-  }
-  return found;
-}
-
-Pairs by_name(const std::vector<scene::Landmark>& moving, const std::vector<scene::Landmark>& fixed,
-              const std::vector<std::string>& files) {
+Pairs by_name(const std::vector<std::string>& files) {
   Pairs pairs;
-  for (const auto& landmark : moving) {
-    find(moving, landmark.name, files[0]);
-    const scene::Landmark* partner = find(fixed, landmark.name, files[1]);
-    if (partner)
-      pairs.add(landmark, *partner);
+  const auto moving = scene::landmarks_by_name(files[0]),
+             fixed = scene::landmarks_by_name(files[1]);
+  for (const auto& [name, position] : moving)
+    if (const auto partner = fixed.find(name); partner != fixed.end())
+      pairs.add(name, position, partner->second);
     else
-      std::printf("  %s is in %s only: left out\n", landmark.name.c_str(), files[0].c_str());
-  }
+      std::printf("  %s is in %s only: left out\n", name.c_str(), files[0].c_str());
   if (pairs.names.size() < 3)
     base::refuse(
         "{} and {}: {} landmark name(s) in common, three are needed; rename them, or use "
@@ -99,13 +84,14 @@ Pairs by_name(const std::vector<scene::Landmark>& moving, const std::vector<scen
 Pairs read_pairs(const base::Options& options) {
   const std::vector<std::string> files = options.texts("landmarks");
   if (files.empty()) base::refuse("-landmarks MOVING.mrk.json FIXED.mrk.json is not given");
+  if (options.text("match") == "name") return by_name(files);
   const auto moving = scene::read_landmarks(files[0]), fixed = scene::read_landmarks(files[1]);
-  if (options.text("match") == "name") return by_name(moving, fixed, files);
   if (moving.size() != fixed.size())
     base::refuse("{} has {} landmarks, {} has {}; -match order needs the same points in both",
                  files[0], moving.size(), files[1], fixed.size());
   Pairs pairs;
-  for (size_t i = 0; i < moving.size(); ++i) pairs.add(moving[i], fixed[i]);
+  for (size_t i = 0; i < moving.size(); ++i)
+    pairs.add(moving[i].name, moving[i].position, fixed[i].position);
   return pairs;
 }
 

@@ -51,14 +51,15 @@ MIDLINE = (*ABOVE_CHIN, "sublabiale", "pogonion", "menton")
 def read_landmarks(file):
     """{name: position} in LPS, as the programs read them (src/scene/landmarks.cpp): 3D Slicer's .mrk.json
     and .fcsv, JSON {"name": [x, y, z], …}, and .csv of name, x, y, z. Spellings of STANDARD become its
-    names; other names stay as they are."""
+    names; other names stay as they are. Two places of one name are refused."""
     ending = pathlib.Path(file).suffix.lower()
     if ending not in (".json", ".fcsv", ".csv"):
         raise Unusable(f"{file}: the ending is none of .mrk.json, .json, .fcsv and .csv")
     with reading(file, "landmarks"):
         text = pathlib.Path(file).read_text(encoding="utf-8-sig")
-        found = of_json(json.loads(text)) if ending == ".json" else of_table(text, ending == ".fcsv")
-        for name, position in found.items():
+        found = (of_json(json.loads(text, object_pairs_hook=once)) if ending == ".json"
+                 else of_table(text, ending == ".fcsv"))
+        for name, position in found:
             if not np.isfinite(position).all():
                 raise ValueError(f"landmark '{name}' has a coordinate that is no finite number")
     if not found:
@@ -75,9 +76,10 @@ SPELLINGS = {plain(spelling): name for name, others in STANDARD.items() for spel
 
 
 def with_standard_names(landmarks, file):
-    """The landmarks by names of STANDARD where they have one; refuses two of one name at different places."""
+    """{name: position} of pairs, by names of STANDARD where they have one; refuses two of one name at different
+    places."""
     renamed, spelled = {}, {}
-    for name, position in landmarks.items():
+    for name, position in landmarks:
         key = SPELLINGS.get(plain(name), name)
         apart = np.linalg.norm(renamed.setdefault(key, position) - position)
         if apart > 1e-3:
@@ -99,27 +101,36 @@ def in_lps(frame, position):
     return np.array([sign * x, sign * y, z])
 
 
+def once(pairs):
+    """The dictionary of a JSON object; refuses a name with two values."""
+    found = dict(pairs)
+    for name, value in pairs:
+        if found[name] != value:
+            raise ValueError(f"'{name}' comes twice; remove one of them")
+    return found
+
+
 def of_json(stored):
-    """Landmarks of markups or, where there are none, of named points in LPS."""
+    """Landmarks, (name, position), of markups or, where there are none, of named points in LPS."""
     if not isinstance(stored, dict):
         raise TypeError("no object with markups or named points")
     if not isinstance(stored.get("markups"), list):
-        return {name: in_lps("LPS", value) for name, value in stored.items()
-                if isinstance(value, list) and len(value) == 3}
-    found = {}
+        return [(name, in_lps("LPS", value)) for name, value in stored.items()
+                if isinstance(value, list) and len(value) == 3]
+    found = []
     for markup in stored["markups"]:
         if markup.get("coordinateUnits") not in (None, "mm", ["mm"] * 3):
             raise ValueError("coordinateUnits must be mm")
         for point in markup.get("controlPoints") or []:
             if point.get("positionStatus", "defined") == "defined":
                 name = point.get("label") or str(len(found) + 1)
-                found[name] = in_lps(markup.get("coordinateSystem"), point["position"])
+                found.append((name, in_lps(markup.get("coordinateSystem"), point["position"])))
     return found
 
 
 def of_table(text, fcsv):
-    """Landmarks of the lines of a .fcsv or .csv file."""
-    found, frame, columns, titled = {}, None, (11, 1) if fcsv else None, False
+    """Landmarks, (name, position), of the lines of a .fcsv or .csv file."""
+    found, frame, columns, titled = [], None, (11, 1) if fcsv else None, False
     for line in filter(None, map(str.strip, text.splitlines())):
         if line.startswith("#"):
             key, _, value = (word.strip() for word in line[1:].partition("="))
@@ -136,7 +147,7 @@ def of_table(text, fcsv):
         if not 0 <= first <= len(row) - 3 or (not fcsv and len(row) > 4):
             raise ValueError(f"expected {'the columns of .fcsv' if fcsv else 'name, x, y, z, separated by commas'}, got '{line}'")
         name = row[label] if label is not None and label < len(row) else ""
-        found[name or str(len(found) + 1)] = in_lps(frame, row[first:first + 3])
+        found.append((name or str(len(found) + 1), in_lps(frame, row[first:first + 3])))
     return found
 
 

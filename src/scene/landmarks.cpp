@@ -245,8 +245,14 @@ std::vector<Landmark> read_landmarks(const std::filesystem::path& file) {
 }
 
 std::map<std::string, Vec3> landmarks_by_name(const std::filesystem::path& file) {
+  constexpr double same = 1e-3;  // mm
   std::map<std::string, Vec3> named;
-  for (const Landmark& landmark : read_landmarks(file)) named[landmark.name] = landmark.position;
+  for (const auto& [name, position] : read_landmarks(file)) {
+    const double apart = (named.try_emplace(name, position).first->second - position).norm();
+    if (apart > same)
+      base::refuse("{}: landmark {} comes twice, {:.1f} mm apart; rename or remove one",
+                   file.string(), base::quote(name), apart);
+  }
   return named;
 }
 

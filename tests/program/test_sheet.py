@@ -182,10 +182,22 @@ def test_names_of_landmarks_are_read_in_any_spelling(tmp_path, spelling, name):
     assert list(read_landmarks(tmp_path / "marks.json")) == [name]
 
 
-def test_two_landmarks_of_one_name_are_refused(tmp_path):
-    (tmp_path / "marks.json").write_text('{"Pog": [0, 0, 0], "pogonion bone": [0, 0, 3]}')
-    with pytest.raises(Unusable, match="'Pog' and 'pogonion bone' are both pogonion_bone, 3.0 mm apart; remove one"):
-        read_landmarks(tmp_path / "marks.json")
+TWICE = {"spelled.json": '{"Pog": [0, 0, 0], "pogonion bone": [0, 0, 3]}',
+         "key.json": '{"a b": [0, 0, 0], "a b": [0, 0, 3]}',
+         "label.mrk.json": MARKUP.format("LPS", '[0, 0, 0]}, {"label": "a b", "position": [0, 0, 3]'),
+         "row.csv": "# CoordinateSystem = LPS\na b, 0, 0, 0\na b, 0, 0, 3\n"}
+
+
+@pytest.mark.parametrize("name, words", [
+    ("spelled.json", "'Pog' and 'pogonion bone' are both pogonion_bone, 3.0 mm apart; remove one"),
+    ("key.json", "'a b' comes twice; remove one"), ("label.mrk.json", "are both a b, 3.0 mm apart"),
+    ("row.csv", "are both a b, 3.0 mm apart")])
+def test_two_landmarks_of_one_name_are_refused(tmp_path, name, words):
+    (tmp_path / name).write_text(TWICE[name])
+    with pytest.raises(Unusable, match=words):
+        read_landmarks(tmp_path / name)
+    (tmp_path / name).write_text(TWICE[name].replace("3", "0"))
+    assert len(read_landmarks(tmp_path / name)) == 1
 
 
 # ----- text as Windows saves it

@@ -21,10 +21,11 @@ struct Landmark {
 /// in a plain CSV a comment line "# CoordinateSystem = LPS" (or RAS). RAS differs by the signs of x
 /// and y. Units are mm ("coordinateUnits" in .mrk.json, if there, must say so). Points that are not
 /// placed ("positionStatus" other than "defined") are left out. Throws InputError, naming file and
-/// place, for a frame that is not said or is neither, a coordinate that is not a finite number, a
-/// name that comes twice, and a file that holds no point.
+/// place, for a frame that is not said or is neither, a coordinate that is not a finite number, and
+/// a file that holds no point.
 std::vector<Landmark> read_landmarks(const std::filesystem::path& file);
-/// Reads landmarks by name; of a name that occurs twice the last.
+/// Reads landmarks by name. Throws InputError, too, for a name at two places more than 1e-3 mm
+/// apart.
 std::map<std::string, Vec3> landmarks_by_name(const std::filesystem::path& file);
 
 /// The text of a .mrk.json file of these landmarks (LPS, mm), as 3D Slicer's Markups module reads

@@ -113,6 +113,18 @@ TEST(Landmarks, BadFilesAreRefusedInOneLine) {
   expect(refusal([] { read_landmarks("nowhere.csv"); }), "nowhere.csv");
 }
 
+TEST(Landmarks, ANameAtTwoPlacesIsRefused) {
+  const Folder folder;
+  const std::string chin = "# CoordinateSystem = LPS\nchin, 1, 2, 3\n";
+  const std::string file = folder.write("a.csv", chin + "chin, 1, 2, 43\n");
+  EXPECT_EQ(read_landmarks(file).size(), 2u);
+  EXPECT_NE(refusal([&] {
+              landmarks_by_name(file);
+            }).find("a.csv: landmark 'chin' comes twice, 40.0 mm apart; rename or remove one"),
+            std::string::npos);
+  EXPECT_EQ(landmarks_by_name(folder.write("b.csv", chin + "chin, 1, 2, 3.0005\n")).size(), 1u);
+}
+
 TEST(TransformFile, WhatIsWrittenIsReadAgain) {
   const Folder folder;
   for (int seed = 0; seed < 20; ++seed) {
