@@ -3,8 +3,8 @@
 ///     repose-isosurface ct.nii.gz -level -300 -largest -output skin.ply
 ///     repose-isosurface dicom_folder -level 300 -components_above 1000 -smooth 10 -output bone.stl
 ///     repose-isosurface labels.nii.gz -labels -largest -output bones.ply
-///     repose-isosurface ct.mhd -level 226 -apart skull.mrk.json jaw.mrk.json -largest -output
-///     bone.ply
+///     repose-isosurface ct.mhd -level 226 -apart skull.mrk.json jaw.mrk.json -largest
+///         -output bone.ply
 ///
 /// Writes the mesh, with -labels one a label (bones_1.ply, bones_2.ply, …), with -apart one a bone,
 /// in LPS and mm, and says what it did to the data. Exit status: 0 done, 1 bad input (nothing

@@ -1,8 +1,9 @@
 /// repose-tradeoff SCENE: what accuracy costs on a scene, and whether the program knows it.
 ///
 ///     repose-tradeoff meshes/paper_jaw_advance.yaml
-///     mpirun -n 2 repose-tradeoff my_head.yaml -methods ntr,lmvm -accuracies 1,0.1,0.01 -layers
-///     2,4,6 drivers/plot_tradeoff.py paper_jaw_advance_tradeoff
+///     mpirun -n 2 repose-tradeoff my_head.yaml -methods ntr,lmvm -accuracies 1,0.1,0.01
+///         -layers 2,4,6
+///     drivers/plot_tradeoff.py paper_jaw_advance_tradeoff
 ///
 /// Solves the scene with methods × accuracies, and varies load steps, volume term, layers and mesh
 /// one at a time; each is compared with a reference of its own. Writes NAME.csv, NAME_map.csv and

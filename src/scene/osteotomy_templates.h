@@ -10,8 +10,7 @@ namespace repose::scene {
 /// Gives an osteotomy the cuts of its template (made_by), by landmarks and in the head's axes:
 ///
 /// - le_fort_1: a level plane `level` mm (default 5) above the nasal spine, and one behind the
-/// upper
-///   jaw, 0.57 of the way from the upper incisors to the condyles;
+///   upper jaw, 0.57 of the way from the upper incisors to the condyles;
 /// - genioplasty: a plane `level` mm (default 4) below point B that falls by 25° towards the back;
 /// - sagittal_split: on either side a buccal, a sagittal and a lingual sheet, at fixed fractions of
 ///   the mandible's length, width and height, the lingual one above the lingula.

@@ -38,7 +38,7 @@ void write_ply(const std::filesystem::path& file, const Surface& surface);
 
 /// Reads a surface, welds and orients it (weld_and_orient), and refuses defects (defects.h) that
 /// `role` does not allow, in one line naming file, defect, number and remedy. Self-intersections
-/// are not searched for: a caller that needs to know them inspects. A surface smaller than 20 mm or
+/// are not searched for: a caller that needs to know them inspects. A surface smaller than 2 mm or
 /// larger than 2000 mm across, unless a mesh, is refused as being in meters or in micrometers.
 Surface load_surface(const std::filesystem::path& file, Role role);
 
