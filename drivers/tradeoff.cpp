@@ -21,9 +21,7 @@
 #include "repose/base/program.h"
 #include "repose/base/text.h"
 #include "repose/base/whole_file.h"
-#include "tradeoff/conclusion.h"
 #include "tradeoff/study.h"
-#include "tradeoff/variants.h"
 
 namespace {
 

@@ -1,10 +1,10 @@
-#include "conclusion.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 #include <map>
+
+#include "study.h"
 
 namespace repose::tradeoff {
 

@@ -8,7 +8,6 @@
 #include <map>
 #include <tuple>
 
-#include "label.h"
 #include "repose/adapt/coarse_model.h"
 #include "repose/app/settings.h"
 #include "repose/base/agreement.h"
@@ -22,7 +21,6 @@
 #include "repose/solve/prestress.h"
 #include "repose/solve/repose.h"
 #include "skin.h"
-#include "variants.h"
 
 namespace repose::tradeoff {
 

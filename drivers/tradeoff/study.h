@@ -37,6 +37,10 @@ struct Measurement {
   double skin_max = 0;  ///< likewise
 };
 
+/// Returns the difference from the other variants of its study: "lmvm, 0.01 mm", "6 layers",
+/// "penalty".
+std::string label(const Variant& variant);
+
 /// Settings to be varied, one thing at a time but for methods × accuracies.
 struct Plan {
   scene::Scene scene;
@@ -49,6 +53,11 @@ struct Plan {
   double reference_accuracy = 1e-8;  ///< mm
   double seconds = 60;               ///< time limit of one run
 };
+
+/// The scene as it stands, solved by the first method.
+Variant usual_variant(const Plan& plan);
+/// All ways of a plan, those of one model one after another.
+std::vector<Variant> variants_of(const Plan& plan);
 
 /// The face on which errors are mapped: the scene's skin at rest in the reference, and how far from
 /// it each way, but those that differ in method or accuracy alone, leaves it.
@@ -71,6 +80,10 @@ using Tell = std::function<void(const std::string& line, size_t number, size_t r
 /// The reference has the most layers and the skin as it is. Throws InputError as the solver does.
 /// Collective.
 Findings measure(const Plan& plan, const Tell& tell);
+
+/// Returns one paragraph for a person: what accuracy costs, what layers and mesh leave, and which
+/// of them to improve first. `usual` is the scene as it stands.
+std::string conclude(const std::vector<Measurement>& found, const Variant& usual);
 
 /// CSV: a line of names, then one row a measurement.
 std::string table(const std::vector<Measurement>& measurements);

@@ -1,6 +1,4 @@
-#include "variants.h"
-
-#include <algorithm>
+#include "study.h"
 
 namespace repose::tradeoff {
 
