@@ -11,6 +11,7 @@
 /// in front of ACTUAL (outside it), weighted by area. Writes NAME.vtp, PREDICTED colored by them,
 /// and NAME.csv, their histogram, which drivers/plot_compare.py draws. Exit status: 0 done, 1 bad
 /// input (nothing written), 3 internal error.
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <map>
@@ -144,19 +145,13 @@ void print_parts(const tools::comparison::FaceParts& parts, const std::vector<Sa
     print_row(std::string("  ") + name, regions[name]);
 }
 
-/// The vertices above a height, with the triangles between them.
+/// The triangles whose vertices all lie above a height.
 surface::Surface above(const surface::Surface& whole, double height) {
-  surface::Surface part{whole.name, {}, {}};
-  std::vector<int64_t> row(whole.points.size(), -1);
-  for (size_t i = 0; i < row.size(); ++i)
-    if (whole.points[i].z() > height) {
-      row[i] = static_cast<int64_t>(part.points.size());
-      part.points.push_back(whole.points[i]);
-    }
-  for (const Triangle& t : whole.triangles)
-    if (row[t[0]] >= 0 && row[t[1]] >= 0 && row[t[2]] >= 0)
-      part.triangles.push_back({row[t[0]], row[t[1]], row[t[2]]});
-  return part;
+  std::vector<Triangle> triangles = whole.triangles;
+  std::erase_if(triangles, [&](const Triangle& t) {
+    return std::any_of(t.begin(), t.end(), [&](auto v) { return whole.points[v].z() <= height; });
+  });
+  return surface::compact(whole.name, whole.points, std::move(triangles));
 }
 
 using Marks = std::map<std::string, Vec3>;

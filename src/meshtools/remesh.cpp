@@ -26,19 +26,6 @@ Mesh mesh_of(const Surface& surface) {
   return mesh;
 }
 
-Surface surface_of(Mesh& mesh, const std::string& name) {
-  mesh.collect_garbage();
-  Surface surface{name, {}, {}};
-  for (const auto v : mesh.vertices()) surface.points.push_back(from_cgal(mesh.point(v)));
-  for (const auto f : mesh.faces()) {
-    Triangle triangle;
-    int corner = 0;
-    for (const auto v : mesh.vertices_around_face(mesh.halfedge(f))) triangle[corner++] = v;
-    surface.triangles.push_back(triangle);
-  }
-  return surface;
-}
-
 }  // namespace
 
 double even_edge(const Surface& surface) {
@@ -51,6 +38,7 @@ Surface remesh(const Surface& surface, double edge) {
   Mesh mesh = mesh_of(surface);
   CGAL::Polygon_mesh_processing::isotropic_remeshing(
       faces(mesh), edge, mesh, CGAL::parameters::number_of_iterations(rounds));
+  mesh.collect_garbage();
   Surface result = surface_of(mesh, surface.name);
   if (result.triangles.empty())
     base::refuse("{}: nothing is left of the surface with edges of {:g} mm; ask for shorter ones",

@@ -95,10 +95,7 @@ void cut_steps(ScanMesh& mesh, const ScanOptions& options) {
 void keep_largest(ScanMesh& mesh) {
   std::vector<Triangle>& triangles = mesh.surface.triangles;
   const auto all = static_cast<int64_t>(triangles.size());
-  const EdgeTable edges(triangles);
-  UnionFind parts(all);
-  for (int64_t e = 0; e < edges.edges(); ++e)
-    parts.unite(edges[e].front().triangle, edges[e].back().triangle);
+  UnionFind parts = connected(triangles, EdgeTable(triangles));
   std::vector<int64_t> size(all, 0);
   for (int64_t t = 0; t < all; ++t) ++size[parts.find(t)];
   const int64_t largest = std::max_element(size.begin(), size.end()) - size.begin();
