@@ -8,7 +8,6 @@
 /// do not agree.
 #include <cstdio>
 
-#include "repose/base/agreement.h"
 #include "repose/base/program.h"
 #include "repose/tools/check/check_file.h"
 
@@ -37,8 +36,5 @@ int main(int argc, char** argv) {
                         {{"RESULT.h5", "a result of repose-solve"}},
                         {{"verbose", base::OptionKind::flag, "",
                           "Print every number of every step, not one row for each kind."}});
-  return base::run_program(options, [&] {
-    base::on_root(MPI_COMM_WORLD, [&] { run(options); });
-    return base::Exit::done;
-  });
+  return base::run_serial_program(options, run);
 }

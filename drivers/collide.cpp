@@ -7,7 +7,6 @@
 /// Exit status: 0 done, whether bones touch or not, 1 bad input, 3 internal error.
 #include <cstdio>
 
-#include "repose/base/agreement.h"
 #include "repose/base/program.h"
 #include "repose/model/build.h"
 #include "repose/model/collision.h"
@@ -58,8 +57,5 @@ void report(const base::Options& options) {
 int main(int argc, char** argv) {
   base::Options options(argc, argv, "Reports contacts between bones along their planned moves.",
                         {{"SCENE", "scene file (.yaml) with moves"}}, option_table());
-  return base::run_program(options, [&] {
-    base::on_root(MPI_COMM_WORLD, [&] { report(options); });
-    return base::Exit::done;
-  });
+  return base::run_serial_program(options, report);
 }

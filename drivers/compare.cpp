@@ -16,7 +16,6 @@
 #include <cstdio>
 #include <map>
 
-#include "repose/base/agreement.h"
 #include "repose/base/log.h"
 #include "repose/base/program.h"
 #include "repose/base/text.h"
@@ -377,8 +376,5 @@ int main(int argc, char** argv) {
                         {{"PREDICTED", "a triangle mesh: PLY, STL, OBJ or OFF, in mm"},
                          {"ACTUAL", "the same, what it is compared with"}},
                         option_table());
-  return base::run_program(options, [&] {
-    base::on_root(MPI_COMM_WORLD, [&] { run(options); });
-    return base::Exit::done;
-  });
+  return base::run_serial_program(options, run);
 }

@@ -7,7 +7,6 @@
 #include <cmath>
 #include <cstdio>
 
-#include "repose/base/agreement.h"
 #include "repose/base/log.h"
 #include "repose/base/program.h"
 #include "repose/base/text.h"
@@ -100,8 +99,5 @@ int main(int argc, char** argv) {
   base::Options options(argc, argv, "Fewest triangles within a proven distance of a mesh.",
                         {{"MESH", "a manifold triangle mesh, open or closed (PLY, STL, OBJ, OFF)"}},
                         option_table());
-  return base::run_program(options, [&] {
-    base::on_root(MPI_COMM_WORLD, [&] { run(options); });
-    return base::Exit::done;
-  });
+  return base::run_serial_program(options, run);
 }

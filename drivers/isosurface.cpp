@@ -11,7 +11,6 @@
 /// written), 3 internal error.
 #include <cstdio>
 
-#include "repose/base/agreement.h"
 #include "repose/base/log.h"
 #include "repose/base/program.h"
 #include "repose/base/whole_file.h"
@@ -250,8 +249,5 @@ int main(int argc, char** argv) {
   base::Options options(
       argc, argv, "Triangle meshes from a CT or a label map, by marching cubes.",
       {{"VOLUME", "a folder of DICOM slices, .nii, .nii.gz, .nrrd, .mha or .mhd"}}, option_table());
-  return base::run_program(options, [&] {
-    base::on_root(MPI_COMM_WORLD, [&] { run(options); });
-    return base::Exit::done;
-  });
+  return base::run_serial_program(options, run);
 }

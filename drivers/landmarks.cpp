@@ -12,7 +12,6 @@
 #include "repose/anatomy/picture.h"
 #include "repose/anatomy/propose.h"
 #include "repose/anatomy/same_head.h"
-#include "repose/base/agreement.h"
 #include "repose/base/program.h"
 #include "repose/base/text.h"
 #include "repose/base/whole_file.h"
@@ -136,9 +135,5 @@ int main(int argc, char** argv) {
   base::Options options(argc, argv, "Proposes the landmarks of a head from its surfaces.",
                         {{"SKIN", "a triangle mesh of the skin: PLY, STL, OBJ or OFF, mm, LPS"}},
                         option_table());
-  return base::run_program(options, [&] {
-    base::Exit exit = base::Exit::done;
-    base::on_root(MPI_COMM_WORLD, [&] { exit = run(options); });
-    return exit;
-  });
+  return base::run_serial_program(options, run);
 }

@@ -9,7 +9,6 @@
 /// input (nothing written), 3 internal error.
 #include <cstdio>
 
-#include "repose/base/agreement.h"
 #include "repose/base/program.h"
 #include "repose/base/text.h"
 #include "repose/base/whole_file.h"
@@ -155,8 +154,5 @@ int main(int argc, char** argv) {
       argc, argv, "Cuts a closed bone surface into closed, named pieces.",
       {{"BONE", "a closed surface (PLY, STL, OBJ, OFF), or a scene (.yaml) with osteotomies"}},
       option_table());
-  return base::run_program(options, [&] {
-    base::on_root(MPI_COMM_WORLD, [&] { cut(options); });
-    return base::Exit::done;
-  });
+  return base::run_serial_program(options, cut);
 }

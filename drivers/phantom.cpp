@@ -8,7 +8,6 @@
 /// 1 bad input (nothing written), 3 internal error.
 #include <cstdio>
 
-#include "repose/base/agreement.h"
 #include "repose/base/program.h"
 #include "repose/base/whole_file.h"
 #include "repose/tools/phantom/phantom.h"
@@ -62,8 +61,5 @@ void write_head(const base::Options& options) {
 int main(int argc, char** argv) {
   base::Options options(argc, argv, "Writes a synthetic head: skin, skull, mandible and scenes.",
                         {}, option_table());
-  return base::run_program(options, [&] {
-    base::on_root(MPI_COMM_WORLD, [&] { write_head(options); });
-    return base::Exit::done;
-  });
+  return base::run_serial_program(options, write_head);
 }

@@ -9,7 +9,6 @@
 #include <cmath>
 #include <cstdio>
 
-#include "repose/base/agreement.h"
 #include "repose/base/program.h"
 #include "repose/base/whole_file.h"
 #include "repose/scene/landmarks.h"
@@ -180,9 +179,5 @@ int main(int argc, char** argv) {
                         {{"MOVING", "the mesh that moves (PLY, STL, OBJ, OFF)"},
                          {"FIXED", "the mesh it is brought to"}},
                         option_table());
-  return base::run_program(options, [&] {
-    base::Exit exit = base::Exit::done;
-    base::on_root(MPI_COMM_WORLD, [&] { exit = run(options); });
-    return exit;
-  });
+  return base::run_serial_program(options, run);
 }

@@ -11,7 +11,6 @@
 #include <cstdio>
 #include <map>
 
-#include "repose/base/agreement.h"
 #include "repose/base/error.h"
 #include "repose/base/program.h"
 #include "repose/base/whole_file.h"
@@ -128,8 +127,5 @@ void run(const base::Options& options) {
 int main(int argc, char** argv) {
   base::Options options(argc, argv, "A laser scanner's range grid as a triangle mesh.",
                         {{"RANGE.ply", "a Cyberware or Stanford range-grid PLY"}}, option_table());
-  return base::run_program(options, [&] {
-    base::on_root(MPI_COMM_WORLD, [&] { run(options); });
-    return base::Exit::done;
-  });
+  return base::run_serial_program(options, run);
 }

@@ -95,6 +95,21 @@ int run_program(Options& options, const std::function<Exit()>& work) {
   return guarded(options, work);
 }
 
+int run_serial_program(Options& options, Exit (*work)(const Options&)) {
+  return run_program(options, [&] {
+    Exit exit = Exit::done;
+    on_root(MPI_COMM_WORLD, [&] { exit = work(options); });
+    return exit;
+  });
+}
+
+int run_serial_program(Options& options, void (*work)(const Options&)) {
+  return run_program(options, [&] {
+    on_root(MPI_COMM_WORLD, [&] { work(options); });
+    return Exit::done;
+  });
+}
+
 double heap_bytes() {
   const auto use = mallinfo2();
   return static_cast<double>(use.uordblks) + static_cast<double>(use.hblkhd);

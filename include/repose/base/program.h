@@ -18,6 +18,10 @@ namespace repose::base {
 /// waits for another.
 int run_program(Options& options, const std::function<Exit()>& work);
 
+/// The frame of a program that does its work on rank 0 only; see run_program.
+int run_serial_program(Options& options, Exit (*work)(const Options&));
+int run_serial_program(Options& options, void (*work)(const Options&));
+
 /// Bytes that this process holds on the heap, blocks mapped on their own included (glibc).
 double heap_bytes();
 
