@@ -124,21 +124,26 @@ surface::Surface box(const Vec3& half) {
   return s;
 }
 
-TEST(BodyContact, LeavesOutNothingThatActsOnAMeshWhereverPointsMove) {
-  constexpr double stiffness = 0.7;
-  const RigidBody body(surface::DistanceField(box({5, 4, 3}), 0.5, 6), -1, Vec3::Zero());
-  std::vector<Vec3> position = random_points(300, 9, 11);
-  const auto count = static_cast<int64_t>(position.size());
+/// The first points and the first body, 1 mm² each.
+model::ContactPairs pairs_of(int64_t count, double offset = 0) {
   model::ContactPairs pairs;
   for (int64_t p = 0; p < count; ++p) pairs.point.push_back(p);
   pairs.body.assign(count, 0);
   pairs.binding.assign(count, model::Binding::touches);
   pairs.area.assign(count, 1);
-  pairs.offset.assign(count, 0);
+  pairs.offset.assign(count, offset);
+  return pairs;
+}
+
+TEST(BodyContact, LeavesOutNothingThatActsOnAMeshWhereverPointsMove) {
+  constexpr double stiffness = 0.7;
+  const RigidBody body(surface::DistanceField(box({5, 4, 3}), 0.5, 6), -1, Vec3::Zero());
+  std::vector<Vec3> position = random_points(300, 9, 11);
+  const auto count = static_cast<int64_t>(position.size());
   std::vector<double> multiplier;
   for (const Vec3& p : random_points(static_cast<int>(count), 0.3, 2))
     multiplier.push_back(std::max(0.0, p.x()));
-  BodyContact loop(pairs, stiffness, {body});
+  BodyContact loop(pairs_of(count), stiffness, {body});
   loop.set_multipliers(multiplier);
   for (int step = 0; step < 8; ++step) {
     std::vector<Vec3> gradient(count, Vec3::Zero());
@@ -158,14 +163,8 @@ TEST(BodyContact, LeavesOutNothingThatActsOnAMeshWhereverPointsMove) {
 
 TEST(BodyContact, StatesDistancesBeyondAMillimeterExactly) {
   const RigidBody body(surface::DistanceField(box({5, 4, 3}), 0.5, 6), -1, Vec3::Zero());
-  model::ContactPairs pairs;
-  pairs.point = {0, 1, 2};
-  pairs.body = {0, 0, 0};
-  pairs.binding.assign(3, model::Binding::touches);
-  pairs.area = {1, 1, 1};
-  pairs.offset = {0, 0, 0};
   const std::vector<Vec3> position = {{7, 6, 0}, {5.2, 0, 0}, {40, 0, 0}};
-  BodyContact loop(pairs, 0.7, {body});
+  BodyContact loop(pairs_of(3), 0.7, {body});
   loop.update_all_gaps(position);
   EXPECT_NEAR(loop.gaps()[0], std::sqrt(8.0), 1e-12);
   EXPECT_NEAR(loop.gaps()[1], 0.2, 1e-6);
@@ -175,14 +174,8 @@ TEST(BodyContact, StatesDistancesBeyondAMillimeterExactly) {
 TEST(BodyContact, MeasuresPointsThatBeganDeepInsideAMeshFromTheSideTheyAreOn) {
   constexpr double began = -2.5;  // mm
   const RigidBody body(surface::DistanceField(box({5, 4, 3}), 0.5, 6), -1, Vec3::Zero());
-  model::ContactPairs pairs;
-  pairs.point = {0, 1, 2};
-  pairs.body = {0, 0, 0};
-  pairs.binding.assign(3, model::Binding::touches);
-  pairs.area = {1, 1, 1};
-  pairs.offset.assign(3, began);
   const std::vector<Vec3> position = {{4.8, 0, 0}, {5, 0, 0}, {6, 0, 0}};
-  BodyContact all(pairs, 0.7, {body}), near = all;
+  BodyContact all(pairs_of(3, began), 0.7, {body}), near = all;
   all.update_all_gaps(position);
   const std::vector<LinearGap> gaps = near.linear_gaps(position, 5, 1);
   ASSERT_EQ(gaps.size(), position.size());
