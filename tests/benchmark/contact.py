@@ -27,7 +27,7 @@ import vtk
 
 from measure import run
 from page import PROJECT, option_parser, print_table
-from tissue import last, model_of
+from tissue import last, model_of, skin
 
 SURFACES = ["skin.ply", "skull.ply", "mandible.ply"]
 JAW = "mouth"  # the scene whose moves the three of the jaw replace
@@ -90,13 +90,6 @@ def solve(text, chosen, folder, ranks=1, steps=0, options=(), program=None):
     done = run([(program or chosen.bin) / "repose-solve", "scene.yaml", "-output", "face",
                 "-accuracy", chosen.accuracy, *steps, *options], own, ranks)
     return done, own / "face.h5"
-
-
-def skin(file):
-    """Vertices of the skin at the start, and their displacements."""
-    model, step = model_of(file), last(file)
-    on_skin = model["point/layer"] == 0
-    return model["point/position"][on_skin], step["point/displacement"][on_skin]
 
 
 def implicit(points, triangles):

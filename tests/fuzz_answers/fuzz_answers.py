@@ -25,18 +25,15 @@ from energy import read_result
 from minimize import Problem, active_set, from_the_start, place_bodies
 from scenes import Writer, plan
 
-PROJECT = pathlib.Path(__file__).resolve().parents[2]
+sys.path.append(str(pathlib.Path(__file__).resolve().parents[1] / "program"))
+
+from conftest import PROJECT, mpi_environment  # noqa: E402
+
 ACCURACY = 1e-4  # mm, asked of the program
 CLOSE = 3e-4  # mm, a rest position is the same
 TIME_LIMIT = 400  # s, of a search
 PATIENCE = 500 * float(os.environ.get("REPOSE_PATIENCE", 1))  # s, of a run
 ENOUGH = 0.8  # of scenes must come to rest or leave no room: others are refused or not converged
-
-
-def environment():
-    command = ". drivers/setup.sh && mpi_environment && env -0"
-    text = subprocess.check_output(["bash", "-c", command], cwd=PROJECT).decode()
-    return dict(entry.split("=", 1) for entry in text.split("\0") if entry)
 
 
 def solve(folder, ranks, binaries, variables):
@@ -187,7 +184,7 @@ def main():
     scenes, every, left, needed = plan(options.seed, end)
     print(f"{every - left} of {every} pairs of features in {end} scenes"
           + (f", all in the first {needed}" if needed else ""), flush=True)
-    variables, counts, clock = environment(), collections.Counter(), time.time()
+    variables, counts, clock = mpi_environment(), collections.Counter(), time.time()
     for number in range(begin, end):
         if time.time() - clock > 60 * options.minutes:
             end = number

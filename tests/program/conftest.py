@@ -92,6 +92,16 @@ def some_on_ranks(cases, ranks, every=4):
             for k, case in enumerate(cases) for count in (1, ranks)]
 
 
+def expect_refusal(run, folder, words, *command, **settings):
+    """Runs a program that must refuse its input in one line with all words, and change nothing in the folder."""
+    before = sorted(folder.rglob("*"))
+    result = run(*command, **settings)
+    assert result.returncode == 1, result
+    assert len(result.stderr.splitlines()) == 1, result.stderr
+    assert [word for word in words if word not in result.stderr] == [], result.stderr
+    assert sorted(folder.rglob("*")) == before
+
+
 @pytest.fixture(scope="session")
 def environment():
     return mpi_environment()
@@ -124,6 +134,14 @@ def runner(folder, environment):
 def run(tmp_path, environment):
     """Runs a program in the test's own folder, see runner."""
     return runner(tmp_path, environment)
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """The test's own folder, with the surfaces of the paper's head."""
+    for file in (PROJECT / "meshes").glob("paper_*.ply"):
+        (tmp_path / file.name).symlink_to(file)
+    return tmp_path
 
 
 @pytest.fixture(scope="session")

@@ -4,6 +4,8 @@ the numbers of a step of a solid from /model and the step's positions."""
 import h5py
 import numpy as np
 
+from tissue import read
+
 GAP_LIMIT = 6.0  # mm
 
 
@@ -13,20 +15,13 @@ class File:
     def __init__(self, file):
         self.folder = file.parent
         with h5py.File(file) as h5:
-            self.model = arrays_of(h5["model"])
+            self.model = read(h5["model"])
             self.contact = dict(h5["model/contact"].attrs) if "contact" in h5["model"] else {}
             self.adhesion = dict(h5["model/adhesion"].attrs) if "adhesion" in h5["model"] else {}
             self.gravity = h5["model"].attrs["gravity"]
             self.elements = {item.attrs["term"].decode(): (item["points"][()], item["numbers"][()].reshape(
                 -1, item.attrs["numbers_each"])) for item in h5["model"].get("element", {}).values()}
-            self.steps = [(arrays_of(step), dict(step.attrs)) for step in h5["step"].values()]
-
-
-def arrays_of(group):
-    found = {}
-    group.visititems(lambda name, item: found.update({name: item[()]})
-                     if isinstance(item, h5py.Dataset) else None)
-    return found
+            self.steps = [(read(step), dict(step.attrs)) for step in h5["step"].values()]
 
 
 # ----- motion

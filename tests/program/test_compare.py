@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import volumes as v
-from conftest import PROJECT
+from conftest import PROJECT, expect_refusal
 
 
 def sphere(file, radius, n=60):
@@ -288,11 +288,7 @@ def test_bad_input_is_refused(run, tmp_path, case):
     sphere(tmp_path / "meters.ply", 0.03, n=6)
     (tmp_path / "text.ply").write_text("no mesh\n")
     (tmp_path / "marks.csv").write_text("# CoordinateSystem = LPS\ntop, 0, 0, 40\n")
-    before = sorted(tmp_path.iterdir())
-    result = run("repose-compare", *arguments)
-    assert result.returncode == 1 and len(result.stderr.splitlines()) == 1, result
-    assert [word for word in words if word not in result.stderr] == [], result.stderr
-    assert sorted(tmp_path.iterdir()) == before
+    expect_refusal(run, tmp_path, words, "repose-compare", *arguments)
 
 
 def test_isosurfaces_of_two_levels_compare(run, tmp_path):

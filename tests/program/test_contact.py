@@ -8,7 +8,7 @@ import pytest
 
 from conftest import PROJECT, runner, shipped, some_on_ranks
 from heads import write
-from tissue import last, model_of
+from tissue import last, model_of, skin
 
 DATA = PROJECT.parent / "shared/data/head"
 ACCURACY = 0.02  # mm
@@ -47,12 +47,6 @@ def solve(folder, environment):
         return folder / f"{name}.h5"
 
     return result
-
-
-def skin(file):
-    model, step = model_of(file), last(file)
-    on_skin = model["point/layer"] == 0
-    return model["point/position"][on_skin], step["point/displacement"][on_skin]
 
 
 @real_head

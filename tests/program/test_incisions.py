@@ -17,13 +17,6 @@ BALL = """instruments:
 TURGOR = (0.02, 0.05, 0.1, 0.2)
 
 
-@pytest.fixture
-def folder(tmp_path):
-    for file in (PROJECT / "meshes").glob("paper_*.ply"):
-        (tmp_path / file.name).symlink_to(file)
-    return tmp_path
-
-
 def cut(run, folder, name="cut", scene=SCENE, ranks=1, accuracy=1e-3):
     (folder / "cut.yaml").write_text(scene)
     result = run("repose-solve", "cut.yaml", "-accuracy", accuracy, "-output", name, ranks=ranks,

@@ -18,13 +18,6 @@ SCENE = SHIPPED.replace("head_", "paper_").replace("sphere: {center: [57, -90, -
 CENTER, RADIUS = np.array([54, -86, -10]), 20  # at the end of the push, mm
 
 
-@pytest.fixture
-def folder(tmp_path):
-    for file in (PROJECT / "meshes").glob("paper_*.ply"):
-        (tmp_path / file.name).symlink_to(file)
-    return tmp_path
-
-
 def press(run, folder, *options, scene=SCENE, ranks=1, accuracy=1e-6):
     (folder / "press.yaml").write_text(scene)
     result = run("repose-solve", "press.yaml", "-accuracy", accuracy, *options, ranks=ranks,

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import volumes as v
+from conftest import expect_refusal
 from heads import DATA
 
 WRITERS = {
@@ -286,12 +287,7 @@ def test_bad_input_is_refused(run, tmp_path, case):
     folder.mkdir()
     volume = spoil(folder)
     level = [] if "-level" in options else ["-level", "1000"]
-    before = sorted(tmp_path.rglob("*"))
-    result = run("repose-isosurface", volume, *level, *options)
-    assert result.returncode == 1, result
-    assert len(result.stderr.splitlines()) == 1, result.stderr
-    assert [word for word in words if word not in result.stderr] == [], result.stderr
-    assert sorted(tmp_path.rglob("*")) == before
+    expect_refusal(run, tmp_path, words, "repose-isosurface", volume, *level, *options)
 
 
 def test_no_level_is_refused(run, tmp_path):

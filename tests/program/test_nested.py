@@ -2,11 +2,10 @@
 
 import re
 
-import h5py
 import pytest
 
 from conftest import runner
-from tissue import apart, last, same_face, steps
+from tissue import apart, last, same_face, skin, steps
 
 SCENE = """skin: head_skin.ply
 bones:
@@ -52,19 +51,11 @@ def head(tmp_path_factory, environment):
     return solve
 
 
-def at_skin(file):
-    """Initial positions and displacements of the skin's points."""
-    with h5py.File(file) as h5:
-        skin = h5["model/point/layer"][()] == 0
-        initial = h5["model/point/position"][()][skin]
-        return initial, last(file)["point/position"][skin] - initial
-
-
 def skin_distance(coarse, fine):
     """Largest distance of the skins' rest positions, at the coarse skin's vertices, mm; displacements
     of the fine skin are averaged over the vertices around."""
     scipy = pytest.importorskip("scipy.spatial")
-    (places, moved), (fine_places, fine_moved) = at_skin(coarse), at_skin(fine)
+    (places, moved), (fine_places, fine_moved) = skin(coarse), skin(fine)
     near = scipy.cKDTree(fine_places).query(places, k=3)[1]
     return ((moved - fine_moved[near].mean(1)) ** 2).sum(1).max() ** 0.5
 
@@ -74,7 +65,7 @@ def test_adapt_solves_a_coarser_model_within_the_accuracy(head):
     error = last(coarse)["discretisation_error"]
     assert error + last(coarse)["displacement_error"] <= 10 and "solved model" in message
     assert "discretisation_error" not in steps(coarse)[0]
-    assert len(at_skin(coarse)[0]) < 1500
+    assert len(skin(coarse)[0]) < 1500
     assert skin_distance(coarse, head()[0]) < error
     checked = head.run("repose-check", coarse)
     assert checked.returncode == 0, checked

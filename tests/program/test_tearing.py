@@ -14,13 +14,6 @@ SCENE = (PROJECT / "meshes/paper_jaw_advance.yaml").read_text().partition("moves
 LIMIT = 0.5
 
 
-@pytest.fixture
-def folder(tmp_path):
-    for file in (PROJECT / "meshes").glob("paper_*.ply"):
-        (tmp_path / file.name).symlink_to(file)
-    return tmp_path
-
-
 def solve(run, folder, name, limit=None, *options, ranks=1, status=0):
     tearing = "" if limit is None else f"tearing: {{limit: {limit}}}\n"
     (folder / f"{name}.yaml").write_text(SCENE + tearing)

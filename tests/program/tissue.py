@@ -31,6 +31,13 @@ def model_of(file):
         return read(h5["model"]) | dict(h5["model"].attrs)
 
 
+def skin(file):
+    """Vertices of the skin at the start, and their displacements in the last step."""
+    model, step = model_of(file), last(file)
+    on_skin = model["point/layer"] == 0
+    return model["point/position"][on_skin], step["point/displacement"][on_skin]
+
+
 def write_model(file, model):
     """A model file of a model as model_of gives it."""
     with h5py.File(file, "w") as h5:
