@@ -165,6 +165,22 @@ def test_a_solver_that_is_killed_is_one_line_and_the_next_works(small):
         assert again.solve(PLAN).converged
 
 
+def test_a_solver_that_ends_within_an_array_is_one_line(small, tmp_path):
+    program, said = tmp_path / "killed", []
+    program.write_text("#!/bin/sh\nread request\nprintf '%s\\n' '{\"id\": 1, \"ok\": true, \"arrays\": [{\"name\": "
+                       "\"position\", \"type\": \"f4\", \"shape\": [2, 3]}]}'\nprintf 12345678\n")
+    program.chmod(0o755)
+
+    def start():
+        with pytest.raises(repose.Refused) as refusal:
+            repose.Session(small, program=program)
+        said.append(str(refusal.value))
+    thread = threading.Thread(target=start, daemon=True)
+    thread.start()
+    thread.join(timeout=20)
+    assert len(said) == 1 and said[0].startswith("repose-live has ended (status 0)"), "it waits without end"
+
+
 def starts_and_stops(scene, count):
     """Starts and stops solvers; resident memory of this process (MB) and open files after each."""
     memory, files = [], []

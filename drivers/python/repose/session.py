@@ -339,24 +339,25 @@ class Session:
                 self._errors = self._errors[-20:] + [line.decode(errors="replace").rstrip()]
 
     def _read(self):
-        stream = self._process.stdout
-        while line := stream.readline():
-            if not line.startswith(b"{"):
-                continue  # of a library: UCX, below MPI, complains on standard output
-            try:
-                head = json.loads(line)
-            except ValueError:
-                break
-            arrays = {}
-            for one in head["arrays"]:
-                kind = np.dtype("<" + one["type"])
-                size = int(np.prod(one["shape"])) * kind.itemsize
-                arrays[one["name"]] = np.frombuffer(stream.read(size), kind).reshape(one["shape"])
-            # Without a number it refuses a line that was not understood: nobody may wait for its answer.
-            for number in list(self._waiting) if head["id"] is None else [head["id"]]:
-                self._give(number, head, arrays)
-        for number in list(self._waiting):
-            self._give(number, None, {})
+        try:
+            while line := self._process.stdout.readline():
+                if line.startswith(b"{"):  # else of a library: UCX, below MPI, complains on standard output
+                    self._take_answer(json.loads(line))
+        except ValueError:
+            pass  # no JSON, or an array that the end of the solver has cut off
+        finally:
+            for number in list(self._waiting):
+                self._give(number, None, {})
+
+    def _take_answer(self, head):
+        arrays = {}
+        for one in head["arrays"]:
+            kind = np.dtype("<" + one["type"])
+            size = int(np.prod(one["shape"])) * kind.itemsize
+            arrays[one["name"]] = np.frombuffer(self._process.stdout.read(size), kind).reshape(one["shape"])
+        # Without a number it refuses a line that was not understood: nobody may wait for its answer.
+        for number in list(self._waiting) if head["id"] is None else [head["id"]]:
+            self._give(number, head, arrays)
 
     def _give(self, number, head, arrays):
         waiting = self._waiting.pop(number, None)
