@@ -1,8 +1,10 @@
 """drivers/map.py: a page without a server, the fit behind it, and its folder of solved plans."""
 
+import contextlib
 import os
 import re
 import sys
+import threading
 
 import numpy as np
 import pytest
@@ -13,6 +15,7 @@ sys.path[:0] = [str(PROJECT / "drivers/python"), str(PROJECT / "drivers")]
 pytest.importorskip("scipy")
 import map as map_driver  # noqa: E402
 import repose  # noqa: E402
+from repose import samples  # noqa: E402
 from repose.kriging import Kriging, covariance  # noqa: E402
 from repose.map import PlanMap, bound_quantile  # noqa: E402
 from repose.samples import PlanBox, SampleStore, Sample  # noqa: E402
@@ -259,6 +262,23 @@ def test_what_stands_behind_a_number_sign_in_a_text_is_no_comment(tmp_path):
     first = hashed(scene)
     scene.write_text('moves: [{bone: "jaw #1", translate: [0, -3, 0]}]\n')
     assert hashed(scene) != first
+
+
+def test_a_failure_of_any_kind_ends_the_run(tmp_path, monkeypatch):
+    box, store, failed = PlanBox(["jaw"], {"translate": [1, 0, 0], "rotate": [0, 0, 0]}), SampleStore(tmp_path, "key"), \
+        threading.Event()
+
+    def solve_sample(opened, box, u, accuracy, tangents):
+        if opened is None:
+            assert failed.wait(20)
+            return Sample(u, np.zeros((2, 3)), np.zeros((1, 2, 3)), True)
+        failed.set()
+        raise MemoryError("no memory")
+    monkeypatch.setattr(samples, "solve_sample", solve_sample)
+    monkeypatch.setattr(samples, "Session", lambda *_, **__: contextlib.nullcontext("another solver"))
+    monkeypatch.setattr(samples.time, "sleep", lambda _: pytest.fail("it waits for a plan that nobody solves"))
+    with pytest.raises(MemoryError, match="no memory"):
+        samples.solve_all("scene.yaml", box, box.points(4), store, 0.1, None, processes=2)
 
 
 def test_a_damaged_sample_is_solved_again(tmp_path):

@@ -172,6 +172,14 @@ def test_what_cannot_be_followed_is_said_in_a_line(started):
     stand_in.move(chin, far)  # nothing follows any more
 
 
+def test_a_failure_of_any_kind_is_said_in_a_line(started):
+    stand_in, widget, lines = started
+    stand_in.run_until(lambda: widget.follower.reference is not None)
+    widget.follower.session.solve = lambda plan, tangents: {}["error"]
+    stand_in.move(stand_in.nodes["Move chin"], np.eye(4))
+    stand_in.run_until(lambda: lines[-1] == "'error'", 5)
+
+
 @pytest.mark.long
 def test_an_answer_of_an_earlier_plan_is_not_shown_after_a_refusal(started):
     stand_in, widget, lines = started

@@ -5,7 +5,6 @@ import threading
 import time
 
 from .motion import motion_of
-from .session import Refused
 
 POLL = 0.03   # s between looks for an answer
 PAUSE = 0.25  # s without a change after which the derivatives are renewed
@@ -87,8 +86,8 @@ class Follower:
         def work():
             try:
                 self._answers.put((number, self.session.solve(plan, tangents=tangents)))
-            except Refused as refusal:
-                self._answers.put((number, refusal))
+            except Exception as reason:  # of any kind, else the view stays at the preview
+                self._answers.put((number, reason))
         thread = threading.Thread(target=work, daemon=True)
         self._threads = [one for one in self._threads if one.is_alive()] + [thread]
         thread.start()
@@ -111,7 +110,7 @@ class Follower:
 
     def _take(self, number, answer):
         latest = number == self._number
-        if isinstance(answer, Refused):
+        if isinstance(answer, Exception):
             if latest:
                 self.view.tell(str(answer))
             return

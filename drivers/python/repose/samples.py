@@ -1,5 +1,6 @@
 """Plans of a box, solved with their derivatives and kept in a folder."""
 
+import contextlib
 import dataclasses
 import hashlib
 import os
@@ -133,29 +134,27 @@ def solve_all(scene, box, points, store, accuracy, session, processes=1, program
         waiting.put(u)
     began, done = time.monotonic(), [0]
 
-    def work(opened):
+    def work(opening):
         try:
-            while not failures:
-                u = waiting.get_nowait()
-                sample = solve_sample(opened, box, u, accuracy, tangents)
-                store.save(sample)
-                done[0] += 1
-                left = (time.monotonic() - began) / done[0] * (len(mine) - done[0])
-                report(done[0], len(mine), f"{done[0]} of {len(mine)} plans solved, {left:.0f} s left" +
-                       ("" if sample.converged else "; the last one did not converge"))
+            with opening() as opened:
+                while not failures:
+                    u = waiting.get_nowait()
+                    sample = solve_sample(opened, box, u, accuracy, tangents)
+                    store.save(sample)
+                    done[0] += 1
+                    left = (time.monotonic() - began) / done[0] * (len(mine) - done[0])
+                    report(done[0], len(mine), f"{done[0]} of {len(mine)} plans solved, {left:.0f} s left" +
+                           ("" if sample.converged else "; the last one did not converge"))
         except queue.Empty:
             pass
-        except (Refused, OSError) as failure:
+        except Exception as failure:  # of any kind: its plan is not solved
             failures.append(failure)
 
-    def work_alone():
-        with Session(scene, program=program) as opened:
-            work(opened)
-
-    threads = [threading.Thread(target=work_alone) for _ in range(min(processes, len(mine)) - 1)]
+    threads = [threading.Thread(target=work, args=[lambda: Session(scene, program=program)])
+               for _ in range(min(processes, len(mine)) - 1)]
     for thread in threads:
         thread.start()
-    work(session)
+    work(lambda: contextlib.nullcontext(session))
     for thread in threads:
         thread.join()
     if failures:
