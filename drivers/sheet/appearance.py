@@ -81,7 +81,7 @@ def read_obj(file, skin):
         elif words[0] == "vt":
             uv.append([float(word) for word in words[1:3]])
         elif words[0] == "f":
-            corners = [[int(n or 0) for n in word.split("/")] for word in words[1:]]
+            corners = [rows_of(word, (len(points), len(uv))) for word in words[1:]]
             faces += [(corners[0], *corners[k:k + 2]) for k in range(1, len(corners) - 1)]
         elif words[0] == "mtllib":
             library = line.split(maxsplit=1)[1].strip()
@@ -92,6 +92,12 @@ def read_obj(file, skin):
         rows = np.array([point[:6] for point in points])
         return colored(rows[:, :3], 255 * rows[:, 3:], skin, file)
     return None
+
+
+def rows_of(corner, counts):
+    """Rows from 1, or 0 for none, of the place and texture coordinate of a corner of a face; -1 is the last so far."""
+    rows = (int(row or 0) for row in corner.split("/"))
+    return [row if row >= 0 else count + 1 + row for row, count in zip(rows, counts)]
 
 
 def texture(file, library):
@@ -113,9 +119,7 @@ def texture(file, library):
 
 def textured(points, uv, faces, image, skin, file):
     """A vertex for each pair of place and texture coordinate."""
-    flat = np.array([[corner[:2] for corner in face] for face in faces]).reshape(-1, 2)
-    flat = np.where(flat < 0, flat + [len(points), len(uv)], flat - 1)
-    pairs, corners = np.unique(flat, axis=0, return_inverse=True)
+    pairs, corners = np.unique(np.reshape(faces, (-1, 2)) - 1, axis=0, return_inverse=True)
     before = np.array([point[:3] for point in points])[pairs[:, 0]]
     require_of_skin(before, skin, file)
     shown = Skin(before, before, corners.reshape(-1, 3), np.zeros(len(before)))

@@ -282,6 +282,18 @@ def test_colors_of_a_part_of_the_skin_are_taken(tmp_path, most):
     assert shown.colors[:3].tolist() == [[0, 0, 0], [0, 255, 0], [0, 510, 0]]
 
 
+def test_rows_from_the_end_of_a_texture_are_those_so_far(tmp_path):
+    (tmp_path / "face.mtl").write_text("map_Kd photo.png\n")
+    (tmp_path / "photo.png").write_bytes(b"\x89PNG a photograph")
+    points = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [5, 0, 0], [6, 0, 0], [5, 1, 0]])
+    lines = [f"v {x} {y} {z}\nvt {x / 10} {y / 10}" for x, y, z in points]
+    (tmp_path / "skin.obj").write_text("\n".join(
+        ["mtllib face.mtl", *lines[:3], "f -3/-3 -2/-2/1 -1/-1", *lines[3:], "f -3/-3 5/5 -1/-1"]))
+    shown = read_appearance(tmp_path / "skin.obj", Skin(points, points, np.array([[0, 1, 2], [3, 4, 5]]), np.ones(6)))
+    assert shown.skin.before[shown.skin.corners].tolist() == points.reshape(2, 3, 3).tolist()
+    assert np.allclose(shown.uv, shown.skin.before[:, :2] / 10)
+
+
 def test_measures_of_the_profile_do_not_depend_on_the_side():
     places = {"glabella": (0, -80, 60), "subnasale": (0, -84, 0), "pronasale": (0, -98, 8), "upper lip": (0, -88, -10),
               "lower lip": (0, -86, -20), "pogonion": (0, -82, -40)}
