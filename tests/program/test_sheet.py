@@ -24,7 +24,7 @@ from sheet.meshes import coarser  # noqa: E402
 from sheet.page import plan_table  # noqa: E402
 from sheet.profile import middle_plane  # noqa: E402
 from sheet.published import PUBLISHED  # noqa: E402
-from sheet.scene import with_moves  # noqa: E402
+from sheet.scene import read_scene, with_moves  # noqa: E402
 from sheet.script import Unusable, own_names  # noqa: E402
 from sheet.shown_skin import Skin, matching_rows, rows_of_patient  # noqa: E402
 from sheet.whole_file import Target  # noqa: E402
@@ -237,11 +237,12 @@ def test_norms_that_are_none_are_refused(tmp_path, stored):
         read_norms(tmp_path / "norms.json")
 
 
-def test_a_plan_of_one_piece_is_written(tmp_path):
+def test_a_plan_of_any_pieces_is_written(tmp_path):
     scene = tmp_path / "scene.yaml"
     scene.write_text("skin: face.ply\n")
-    Scene(scene).with_plan("chin", tmp_path / "planned.yaml")
-    assert "pieces: [chin]" in (tmp_path / "planned.yaml").read_text()
+    for pieces in ("chin", ["left, upper", "Kinn: #1", "menton à l'avant 🙂"]):
+        planned = Scene(scene).with_plan(pieces, tmp_path / "planned.yaml")
+        assert read_scene(planned.path)["plan"]["pieces"] == (pieces if isinstance(pieces, list) else [pieces])
 
 
 # ----- colors of a skin

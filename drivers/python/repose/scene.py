@@ -100,7 +100,7 @@ class Scene:
         if any(line.startswith("plan:") for line in text.splitlines()):
             raise ValueError(f"{self.path}: the scene has a plan already")
         numbers = [", ".join(f"{value:g}" for value in box) for box in (translate, rotate)]
-        path.write_text(f"{text.rstrip()}\nplan:\n  pieces: [{', '.join(pieces)}]\n"
+        path.write_text(f"{text.rstrip()}\nplan:\n  pieces: {json.dumps(pieces, ensure_ascii=False)}\n"
                         f"  box: {{translate: [{numbers[0]}], rotate: [{numbers[1]}]}}\n",
                         encoding="utf-8")
         return Scene(path)
