@@ -342,7 +342,8 @@ def scene_text(operations, edge, bones):
 
 def arguments():
     parser = Arguments(__doc__)
-    parser.add_argument("volumes", nargs="+", type=pathlib.Path)
+    parser.add_argument("volume", type=pathlib.Path)
+    parser.add_argument("labels", nargs="?", type=pathlib.Path)
     parser.add_argument("-operation", required=True)
     parser.add_argument("-output", default="plan", type=pathlib.Path)
     parser.add_argument("-level", type=number_from(-32768, 65535, float), default=SKIN)
@@ -351,7 +352,14 @@ def arguments():
     parser.add_argument("-edge", type=number_from(1, 20, float), default=4)
     parser.add_argument("-ranks", type=number_from(1, 1024), default=min(2, os.cpu_count() or 1))
     parser.add_argument("-propose", action="store_true")
-    return parser.parse_args()
+    chosen = parser.parse_intermixed_args()
+    chosen.segmented = chosen.volume.name.lower().endswith(".seg.nrrd")
+    if chosen.segmented and chosen.labels:
+        refuse(f"{chosen.labels}: {chosen.volume} is a segmentation, which needs no LABELS; give one of them, or a CT and "
+               "LABELS")
+    if chosen.apart and (chosen.segmented or chosen.labels):
+        refuse("-apart: the bones are those of the segmentation; leave it out, or give a CT alone")
+    return chosen
 
 
 def mpi_environment():
@@ -364,26 +372,26 @@ def mpi_environment():
 def main():
     mpi_environment()
     options, begin = arguments(), time.monotonic()
-    folder, volume, labels = options.output, options.volumes[0], options.volumes[-1]
-    for file in [*options.volumes, *(options.apart or [])]:
+    folder, volume = options.output, options.volume
+    labels = volume if options.segmented else options.labels
+    inputs = [file for file in (volume, options.labels, *(options.apart or [])) if file]
+    for file in inputs:
         if not file.exists():
             refuse(f"{file}: no such file or folder")
     if folder.exists() and not folder.is_dir():
         refuse(f"-output {folder}: is a file, not a folder; choose another name")
-    alone = len(options.volumes) == 1 and not volume.name.lower().endswith(".seg.nrrd")
-    if alone and options.bone <= options.level:
+    if not labels and options.bone <= options.level:
         refuse(f"-level {options.level:g}: the skin's level must be below that of bone, -bone {options.bone:g}; give both in "
                f"the values of the volume, such as -level {options.level:g} -bone {options.level + BONE - SKIN:g}")
     operations = read_or_refuse(options.operation)
     print(f"understood: {summarize(operations)}", flush=True)
-    begin_run(folder, operations, [*options.volumes, *(options.apart or [])])
-    segmented = volume.name.lower().endswith(".seg.nrrd")
-    if alone:
-        extract_bones(volume, options, folder)
-    else:
+    begin_run(folder, operations, inputs)
+    if labels:
         with tempfile.TemporaryDirectory(prefix="labels_", dir=folder) as work:
-            extract_labels(labels, folder, pathlib.Path(work), segmented)
-    if not segmented:
+            extract_labels(labels, folder, pathlib.Path(work), options.segmented)
+    else:
+        extract_bones(volume, options, folder)
+    if not options.segmented:
         run(program("repose-isosurface"), volume, "-level", options.level, "-core", options.level + CORE,
             "-largest", "-output", folder / "skin.ply")
     whole = folder / "skull_and_maxilla.ply"

@@ -248,9 +248,13 @@ def test_segments_that_overlap_are_in_layers(tmp_path):
 
 @pytest.mark.parametrize("arguments, words", [
     (["none.mhd", "-operation", "jaw, 5 mm forward"], ["none.mhd"]),
-    (["ct.mhd", "labels.mhd", "-operation", "nose job, 5 mm up"], ["'nose'", "name Le Fort I"])])
+    (["ct.mhd", "labels.mhd", "-operation", "nose job, 5 mm up"], ["'nose'", "name Le Fort I"]),
+    (["ct.mhd", "labels.mhd", "other.mhd", "-operation", "jaw, 5 mm forward"], ["unrecognized arguments: other.mhd"]),
+    (["head.seg.nrrd", "-operation", "jaw, 5 mm forward", "labels.mhd"], ["labels.mhd: head.seg.nrrd is a segmentation"]),
+    (["head.seg.nrrd", "-operation", "jaw, 5 mm forward", "-apart", "ct.mhd", "ct.mhd"], ["-apart: the bones are those"]),
+    (["ct.mhd", "labels.mhd", "-apart", "ct.mhd", "ct.mhd", "-operation", "jaw, 5 mm forward"], ["-apart: the bones are"])])
 def test_what_cannot_be_planned_is_refused_in_one_line(tmp_path, environment, arguments, words):
-    for name in ("ct.mhd", "labels.mhd"):
+    for name in ("ct.mhd", "labels.mhd", "head.seg.nrrd"):
         (tmp_path / name).touch()
     result = finish([sys.executable, SCRIPT, *arguments], tmp_path, environment, 60)
     assert result.returncode == 1 and result.stderr.count("\n") == 1, result
