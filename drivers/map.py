@@ -12,6 +12,7 @@ exactly, writes the result, and says how far the map is from it. Needs: apt-get 
 --no-install-recommends python3-numpy python3-scipy"""
 
 import html
+import itertools
 import json
 import math
 import os
@@ -101,14 +102,13 @@ def described(session, plan_map, command, about):
     return said, pack.text()
 
 
-def page(scene, session, plan_map, accuracy):
+def page(chosen, session, plan_map):
     """The page as text."""
     web = HERE / "web"
     read = lambda names: "\n".join((web / name).read_text(encoding="utf-8") for name in names)
     scripts = read(("three.js", "viewer.js", "pack.js", "plan.js", "map.js"))
-    command = f"drivers/map.py {shlex.quote(str(scene))}"
-    said, packed = described(session, plan_map, command, summary(plan_map, accuracy))
-    return PAGE.format(title=html.escape(scene.stem), body=read(["map.html"]), packed=packed,
+    said, packed = described(session, plan_map, chosen.command, summary(plan_map, chosen.accuracy))
+    return PAGE.format(title=html.escape(chosen.scene.stem), body=read(["map.html"]), packed=packed,
                        style=read(("viewer.css", "live.css", "map.css")),
                        scripts=scripts.replace("</script", "<\\/script"),
                        described=json.dumps(said).replace("<", "\\u003c"))
@@ -129,12 +129,12 @@ def summary(plan_map, accuracy):
             "and teaching.")
 
 
-def fitted_page(scene, session, box, samples, accuracy):
+def fitted_page(chosen, session, box, samples):
     """The map and its page, with as many modes as fit into it."""
     modes = MOST_MODES
     while True:
-        plan_map = PlanMap(box, samples, modes, accuracy)
-        text = page(scene, session, plan_map, accuracy)
+        plan_map = PlanMap(box, samples, modes, chosen.accuracy)
+        text = page(chosen, session, plan_map)
         if len(text) < LARGEST_PAGE:
             return plan_map, text
         modes = len(plan_map.modes.shapes) * 3 // 4
@@ -169,6 +169,9 @@ def arguments():
     chosen = parser.parse_args()
     if not chosen.scene.is_file():
         refuse(f"{chosen.scene}: no such file")
+    given = [(f"-{name}", str(getattr(chosen, name))) for name in ("samples", "accuracy", "cache")
+             if getattr(chosen, name) != parser.get_default(name)]
+    chosen.command = shlex.join(["drivers/map.py", str(chosen.scene), *itertools.chain(*given)])
     stem = chosen.scene.with_suffix("")
     chosen.cache = chosen.cache or pathlib.Path(f"{stem}_map")
     require_folder(chosen.cache)
@@ -233,7 +236,7 @@ def make_page(chosen, session, box, store):
                         report=show_progress)
     if samples is None:
         return  # another rank makes the page
-    plan_map, text = fitted_page(chosen.scene, session, box, samples, chosen.accuracy)
+    plan_map, text = fitted_page(chosen, session, box, samples)
     chosen.output.write(text)
     print(f"{chosen.output}: {len(text) / 1e6:.2f} MB, {len(plan_map.u)} plans, "
           f"{len(plan_map.modes.shapes)} modes\n{summary(plan_map, chosen.accuracy)}")

@@ -256,7 +256,7 @@ class MapPage {
     const round = values => values.map(v => Number(v.toFixed(3)));
     const plan = Object.fromEntries(Object.entries(this.plan).map(([piece, motion]) =>
       [piece, {translate: round(motion.translate), rotate: round(motion.rotate)}]));
-    return `${this.described.command} -plan '${JSON.stringify(plan)}'`;
+    return `${this.described.command} -plan '${JSON.stringify(plan).replaceAll("'", "\\u0027")}'`;
   }
 
   color() {

@@ -3,6 +3,7 @@
 import contextlib
 import os
 import re
+import shlex
 import sys
 import threading
 
@@ -141,6 +142,8 @@ def test_sliders_move_the_face_as_python_does(made):
       found.gray = mapPage.skin.grays[1].every(Boolean);
       document.getElementById("go_nearest").click();
       found.nearest = document.getElementById("nearest").textContent;
+      mapPage.plan = {"patient's jaw": zero()};
+      found.quoted = mapPage.command();
       found.wide = document.documentElement.scrollWidth - innerWidth;
       return found;""", size=(420, 900))
     assert "error" not in found, found
@@ -152,7 +155,10 @@ def test_sliders_move_the_face_as_python_does(made):
     assert np.linalg.norm(moved - expected, axis=1).max() < 0.02
     assert np.linalg.norm(moved - np.reshape(found["first"], (-1, 3)), axis=1).max() > 1
     assert np.allclose(found["bound"], plan_map.bound({"mandible": found["plan"]}), atol=0.01, rtol=0.01)
-    assert "-plan '{\"mandible\":{\"translate\":[0,-3.5,0],\"rotate\":[-2,0,0]}}'" in found["command"]
+    assert shlex.split(found["command"]) == [
+        "drivers/map.py", str(scene), "-samples", str(SAMPLES), "-accuracy", "0.05", "-plan",
+        '{"mandible":{"translate":[0,-3.5,0],"rotate":[-2,0,0]}}']
+    assert map_driver.read_plan(shlex.split(found["quoted"])[-1]).keys() == {"patient's jaw"}
     assert re.match(r"about \d\.\d\d mm on 95 % of the skin: 9 plans are solved, a bound needs 19", found["mark"])
     assert found["gray"] and found["nearest"] == "This plan was solved itself." and found["wide"] <= 0
 
