@@ -25,13 +25,8 @@ HERE = pathlib.Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE / "python"), str(HERE)]
 from sheet.scene import named_file, with_moves  # noqa: E402
 from sheet.script import Arguments, Unusable, number_from, refuse, refuse_missing, run  # noqa: E402
+from sheet.web_page import read_web, web_page  # noqa: E402
 
-PAGE = """<!doctype html>
-<html lang="en"><head><meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<link rel="icon" href="data:,"><title>{title}</title><style>{style}</style></head>
-<body>{body}<script>{scripts}</script></body></html>
-"""
 LONGEST_REQUEST = 1 << 20
 VERIFY_EVERY = 20  # answers, of which one is solved again from a cold start
 ANGLES = ("facial convexity", "nasolabial angle", "nasolabial angle by the tip", "mentolabial angle")
@@ -39,13 +34,8 @@ ANGLES = ("facial convexity", "nasolabial angle", "nasolabial angle by the tip",
 
 def page(scene):
     """The page with all that it needs: no request but to this server."""
-    web = HERE / "web"
-    read = lambda name: (web / name).read_text(encoding="utf-8")
-    scripts = "\n".join(read(name).replace("</script", "<\\/script")
-                        for name in ("three.js", "viewer.js", "plan.js", "live.js"))
-    style = read("viewer.css") + read("live.css")
-    return PAGE.format(title=scene.stem, style=style, body=read("live.html"),
-                       scripts=scripts).encode()
+    return web_page(scene.stem, read_web("live.html"), ("viewer.css", "live.css"),
+                    ("three.js", "viewer.js", "plan.js", "live.js")).encode()
 
 
 def packed(head, arrays):

@@ -11,7 +11,6 @@ Solved plans are kept in a folder beside the page; a run that was ended goes on.
 exactly, writes the result, and says how far the map is from it. Needs: apt-get install
 --no-install-recommends python3-numpy python3-scipy"""
 
-import html
 import itertools
 import json
 import math
@@ -21,6 +20,7 @@ import shlex
 import sys
 
 from sheet.script import Arguments, Unusable, number_from, refuse, refuse_missing, run
+from sheet.web_page import read_web, web_page
 from sheet.whole_file import Target
 
 HERE = pathlib.Path(__file__).resolve().parent
@@ -28,13 +28,6 @@ sys.path.insert(0, str(HERE / "python"))
 LARGEST_PAGE = 5_000_000  # bytes
 BONE_TRIANGLES = 16_000
 CLOSE = 0.005             # mm: what rounding a mode may change
-PAGE = """<!doctype html>
-<html lang="en"><head><meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<link rel="icon" href="data:,"><title>{title}</title><style>{style}</style></head>
-<body>{body}<script type="application/json" id="described">{described}</script>
-<script type="text/plain" id="packed">{packed}</script><script>{scripts}</script></body></html>
-"""
 
 
 try:
@@ -104,14 +97,9 @@ def described(session, plan_map, command, about):
 
 def page(chosen, session, plan_map):
     """The page as text."""
-    web = HERE / "web"
-    read = lambda names: "\n".join((web / name).read_text(encoding="utf-8") for name in names)
-    scripts = read(("three.js", "viewer.js", "pack.js", "plan.js", "map.js"))
     said, packed = described(session, plan_map, chosen.command, summary(plan_map, chosen.accuracy))
-    return PAGE.format(title=html.escape(chosen.scene.stem), body=read(["map.html"]), packed=packed,
-                       style=read(("viewer.css", "live.css", "map.css")),
-                       scripts=scripts.replace("</script", "<\\/script"),
-                       described=json.dumps(said).replace("<", "\\u003c"))
+    return web_page(chosen.scene.stem, read_web("map.html"), ("viewer.css", "live.css", "map.css"),
+                    ("three.js", "viewer.js", "pack.js", "plan.js", "map.js"), said, packed)
 
 
 def summary(plan_map, accuracy):

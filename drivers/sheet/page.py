@@ -1,10 +1,7 @@
 """The planning sheet: one HTML page of one result or of two plans of one patient."""
 
 import html
-import json
 import math
-import os
-import pathlib
 
 import numpy as np
 
@@ -17,9 +14,9 @@ from sheet.profile import COLORS, complete, cut, drawing, outlines
 from sheet.shown_skin import matching_rows, rows_of_patient
 from sheet.result import Figure
 from sheet.tables import folded, table, tenths
+from sheet.web_page import web_page
 from sheet.words import PUBLISHED, by_part, paragraphs
 
-WEB = pathlib.Path(__file__).resolve().parents[1] / "web"
 MOST_TRIANGLES = 80_000  # of the skin, and of all bones, in the view to turn
 UNCERTAIN = ("e8f0ea", "f3d9a4", "d9822b", "8c2d04")
 REGION = ("a8acb2", "2a9d8f")
@@ -150,7 +147,7 @@ def described(plans, appearance):
     if others:
         apart = np.linalg.norm(others[0] - plans[0].result.skin.after, axis=1)
         shown["apart"] = rounded_up(float(apart.max()))
-    return json.dumps(shown), pack.text()
+    return shown, pack.text()
 
 
 def frame(plans):
@@ -407,30 +404,18 @@ step="0.02" value="1"> <span id="share-to"></span></label>
 Point at the skin, or tap it, to read how far it moves.</p>"""
 
 
-def style():
-    return "".join((WEB / name).read_text(encoding="utf-8") for name in ("viewer.css", "sheet.css"))
-
-
-def scripts():
-    return "".join(f"<script>{(WEB / name).read_text(encoding='utf-8')}</script>"
-                   for name in ("three.js", "viewer.js", "pack.js", "sheet.js"))
-
-
 def write(plans, norms, scene, appearance, frame):
     """The page as text; `frame`: whose axes its directions are along."""
     first = plans[0]
-    title = html.escape(" and ".join(plan.name for plan in plans))
+    title = " and ".join(plan.name for plan in plans)
     words, packed = described(plans, appearance)
     message = "".join((f"<h3>{html.escape(plan.name)}</h3>" if len(plans) > 1 else "") +
                    paragraphs(plan.result, plan.known, plan.parts, plan.guessed,
                               plan is plans[-1]) + plan_lines(plan) for plan in plans)
     landmarks = "".join((f"<h3>{html.escape(plan.name)}</h3>" if len(plans) > 1 else "") +
                         landmark_table(plan) for plan in plans)
-    return f"""<!DOCTYPE html>
-<html lang="en"><head><meta charset="utf-8">
-<meta name="viewport" content="width=device-width,initial-scale=1"><title>{title}</title>
-<style>{style()}</style></head><body><main><div class="page-one">
-<header><h1>{title}</h1><span class="soft">predicted face after the planned surgery</span></header>
+    body = f"""<main><div class="page-one">
+<header><h1>{html.escape(title)}</h1><span class="soft">predicted face after the planned surgery</span></header>
 <section class="first"><div>{view(plans)}</div><div>{numbers(plans)}{message}</div></section>
 <div class="stills" id="stills"></div>
 <section><h2>The plan</h2>{plan_table(plans, frame)}</section></div>
@@ -440,10 +425,8 @@ def write(plans, norms, scene, appearance, frame):
 <section class="measures"><h2>Measures of the soft tissue</h2>{measure_table(plans, norms)}</section>
 <section class="screen"><h2>Landmarks</h2>{landmarks}</section>
 {"".join(folded([(plan.name, plan.result) for plan in plans], scene))}
-</main><script type="application/json" id="described">{words}</script>
-<script type="text/plain" id="packed">{packed}</script>
-{scripts()}</body></html>
-"""
+</main>"""
+    return web_page(title, body, ("viewer.css", "sheet.css"), ("three.js", "viewer.js", "pack.js", "sheet.js"), words, packed)
 
 
 __all__ = ["BEYOND", "Plan", "spoken", "write"]

@@ -213,6 +213,10 @@ def test_angles_are_those_of_the_head_in_any_pose(live, tmp_path):
     assert abs(np.subtract(*found[0]["facial convexity"])) > 1
 
 
+def test_a_scene_has_any_name(live, tmp_path):
+    assert b"<title>a &lt;plan&gt; &amp; more</title>" in live.page(tmp_path / "a <plan> & more.yaml")
+
+
 def status(address, path, headers=None, content=None):
     request = urllib.request.Request(address.split("/?")[0] + path, content, headers or {})
     try:

@@ -38,7 +38,7 @@ class Page(html.parser.HTMLParser):
     def handle_starttag(self, tag, attributes):
         named = dict(attributes)
         self.links += [named[key] for key in ("src", "href") if key in named]
-        if tag not in ("meta", "img", "input"):
+        if tag not in ("meta", "link", "img", "input"):
             self.open.append(tag)
         if tag == "tr":
             self.row = []
@@ -101,6 +101,17 @@ def test_numbers_are_those_of_the_result(report, opened, tmp_path):
     assert page.rows["1.00"][0] == "yes"
     assert page.rows["ranks"] == ["1"] and page.rows["program"][0].startswith("Repose ")
     assert page.rows["command"][0].endswith(f"{SCENE} -allow_folded -output {opened.with_suffix('')}")
+
+
+def test_a_name_of_a_bone_ends_no_script(report, opened, tmp_path):
+    shutil.copy(opened, tmp_path / "named.h5")
+    with h5py.File(tmp_path / "named.h5", "r+") as h5:
+        bones = [b"</script><b>jaw" if name == b"mandible" else name for name in h5["model/bone"][:]]
+        del h5["model/bone"]
+        h5["model/bone"] = np.array(bones)
+    page = page_of(report, tmp_path, tmp_path / "named.h5")
+    assert "</script><b>jaw" in page.rows
+    assert "</script><b>jaw" in [one["name"] for one in View(tmp_path / "page.html").told["surfaces"]]
 
 
 def to_head(vectors):
@@ -214,7 +225,7 @@ def test_lips_that_part_are_measured(report, opened, tmp_path):
 
 def test_the_page_stands_alone(report, opened, tmp_path):
     page = page_of(report, tmp_path, opened)
-    assert page.links == []
+    assert page.links == ["data:,"], "an icon that is none"
     for word in ("import(", "fetch("):
         assert word not in "".join((PROJECT / "drivers/web" / name).read_text()
                                    for name in ("viewer.js", "sheet.js"))
