@@ -110,6 +110,25 @@ class Handler(http.server.BaseHTTPRequestHandler):
             pass  # the page was closed
 
     def do_GET(self):
+        self.answer(self.get)
+
+    def do_POST(self):
+        self.answer(self.post)
+
+    def answer(self, work):
+        """Answers a request by `work`, or says in words why not."""
+        from repose import Refused
+        try:
+            work()
+        except (Refused, Unusable) as refusal:
+            overtaken = str(refusal).startswith("abandoned")  # the page has requested another since
+            self.reply(204 if overtaken else 409, b"" if overtaken else str(refusal).encode(),
+                       "text/plain; charset=utf-8")
+        except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+            self.close_connection = True  # what is left of the body is no request
+            self.reply(400, f"malformed request: {error}\n".encode(), "text/plain; charset=utf-8")
+
+    def get(self):
         address = urllib.parse.urlsplit(self.path)
         query = urllib.parse.parse_qs(address.query)
         if not self.allowed(query.get("token", [self.headers.get("X-Token", "")])[0]):
@@ -130,23 +149,13 @@ class Handler(http.server.BaseHTTPRequestHandler):
             raise ValueError(f"its length must be 0 … {LONGEST_REQUEST} bytes")
         return self.rfile.read(length)
 
-    def do_POST(self):
-        from repose import Refused
-        try:
-            content = self.content()
-            if not self.allowed(self.headers.get("X-Token", "")):
-                return
-            request = json.loads(content)
-            work = {"/solve": self.solve, "/scene_file": self.scene_file,
-                    "/result": self.result, "/report": self.report}[self.path]
-            self.reply(200, work(request))
-        except (Refused, Unusable) as refusal:
-            overtaken = str(refusal).startswith("abandoned")  # the page has requested another since
-            self.reply(204 if overtaken else 409, b"" if overtaken else str(refusal).encode(),
-                       "text/plain; charset=utf-8")
-        except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
-            self.close_connection = True  # what is left of the body is no request
-            self.reply(400, f"malformed request: {error}\n".encode(), "text/plain; charset=utf-8")
+    def post(self):
+        content = self.content()
+        if not self.allowed(self.headers.get("X-Token", "")):
+            return
+        work = {"/solve": self.solve, "/scene_file": self.scene_file, "/result": self.result,
+                "/report": self.report}[self.path]
+        self.reply(200, work(json.loads(content)))
 
     def solve(self, request):
         session = self.server.session

@@ -252,6 +252,27 @@ def test_requests_are_answered_or_refused_in_words(served):
     assert code == 409 and b"'chin': translation 99 mm" in message
 
 
+def test_a_solver_or_scene_that_is_gone_is_said_in_words(live, environment, scene, tmp_path):
+    os.environ.update(environment)
+    own = tmp_path / "own.yaml"
+    own.write_text(scene.read_text())
+    with repose.Session(own, program=programs() / "repose-live") as session:
+        server, address = live.make_server(session, own)
+        thread = threading.Thread(target=server.serve_forever)
+        thread.start()
+        try:
+            own.write_bytes(b"\0")
+            code, notice = status(address, "/notice", {"X-Token": server.token})
+            assert code == 200 and "has changed on disk" in json.loads(notice)["text"]
+            session._process.kill()
+            code, message = status(address, "/scene", {"X-Token": server.token})
+            assert code == 409 and message.startswith(b"repose-live has ended")
+        finally:
+            server.shutdown()
+            thread.join()
+            server.server_close()
+
+
 def test_a_saved_scene_is_the_plan(live, served, run, tmp_path):
     server, address = served
     matrix = [[1, 0, 0, 0], [0, 1, 0, -1.5], [0, 0, 1, 0], [0, 0, 0, 1]]

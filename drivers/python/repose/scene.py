@@ -117,14 +117,14 @@ class SceneWatch:
         return [(file, file.stat().st_size, file.stat().st_mtime_ns) for file in self.scene.files()]
 
     def changed(self):
-        """Returns whether the content differs; files that are gone count as changed."""
+        """Returns whether the content differs; files that are gone, and no scene, count as changed."""
         try:
             stamps = self._stamps()
             if stamps == self.stamps:
                 return False
             if self.scene.fingerprint() != self.first:
                 return True
-        except OSError:
+        except (OSError, ValueError):
             return True
         self.stamps = stamps
         return False
