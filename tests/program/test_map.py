@@ -201,6 +201,14 @@ def test_a_changed_mesh_has_other_plans(tmp_path):
     assert repose.Scene(scene).fingerprint() != first
 
 
+def test_a_file_that_a_comment_names_is_none_of_the_scene(tmp_path):
+    scene = tmp_path / "scene.yaml"
+    for name in ("skin.ply", "old.ply"):
+        (tmp_path / name).write_text("a")
+    scene.write_text("# the patient's old.ply\nskin: skin.ply # not old.ply\n  # skin: {volume: .}\n")
+    assert repose.Scene(scene).files() == [scene, tmp_path / "skin.ply"]
+
+
 def hashed(file):
     return repose.Scene(file).fingerprint()
 

@@ -59,13 +59,13 @@ class Scene:
             raise FileNotFoundError(f"{path}: there is no such scene")
 
     def _text(self):
-        """The scene as text; ValueError where it cannot be YAML."""
+        """The scene as text without its comments; ValueError where it cannot be YAML."""
         if self.path.stat().st_size > LARGEST:
             raise ValueError(f"{self.path}: too large for a scene file (1 MiB allowed); give a scene file (.yaml)")
         content = self.path.read_bytes()
         if re.search(rb"[\x00-\x08\x0e-\x1f\x7f]", content):
             raise ValueError(f"{self.path}: not a text file; give a scene file (.yaml)")
-        return content.decode(errors="replace")
+        return re.sub(r"""^([^"'\n]*?)(?:\s+|(?<!\S))#.*""", r"\1", content.decode(errors="replace"), flags=re.M)
 
     def files(self):
         """The scene file, then the files that it names, those that hold their voxels, and DICOM slices."""
@@ -80,8 +80,7 @@ class Scene:
 
     def fingerprint(self, program=None):
         """A hash of the scene without its comments, of the files that it names, and of the solver."""
-        text = re.sub(r"""^([^"'\n]*?)(?:\s+|(?<!\S))#.*""", r"\1", self._text(), flags=re.M)
-        digest = hashlib.sha256(text.encode())
+        digest = hashlib.sha256(self._text().encode())
         for file in self.files()[1:]:
             digest.update(os.path.relpath(file, self.path.parent).encode() + file.read_bytes())
         if program:
