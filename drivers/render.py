@@ -105,6 +105,12 @@ def has_display():
     return bool(connect(None))
 
 
+def vtk_version():
+    """(major, minor) of this interpreter's VTK."""
+    from vtkmodules.vtkCommonCore import vtkVersion
+    return vtkVersion.GetVTKMajorVersion(), vtkVersion.GetVTKMinorVersion()
+
+
 def find_screen():
     """Where there is no display VTK draws without one from 9.4 on. An older one does on a screen in
     memory; where this interpreter has none, ParaView's does. That would take options for its own,
@@ -113,8 +119,7 @@ def find_screen():
     if own and has_display():
         return
     if own:
-        from vtkmodules.vtkCommonCore import vtkVersion
-        if (vtkVersion.GetVTKMajorVersion(), vtkVersion.GetVTKMinorVersion()) >= (9, 4):
+        if vtk_version() >= (9, 4):
             for library, window in (("EGL", "vtkEGLRenderWindow"),
                                     ("OSMesa", "vtkOSOpenGLRenderWindow")):
                 if ctypes.util.find_library(library):
@@ -448,7 +453,7 @@ def color_bar(table):
     bar.SetLookupTable(table)
     bar.SetOrientationToHorizontal()
     bar.SetNumberOfLabels(3)
-    bar.SetLabelFormat("{:.2g}" if vtk.vtkVersion.GetVTKMinorVersion() >= 6 else "%.2g")
+    bar.SetLabelFormat("{:.2g}" if vtk_version() >= (9, 6) else "%.2g")
     bar.UnconstrainedFontSizeOn()
     text = bar.GetLabelTextProperty()
     text.SetColor(INK)
