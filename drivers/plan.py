@@ -37,13 +37,14 @@ import unicodedata
 import zlib
 
 HERE = pathlib.Path(__file__).resolve().parent
-sys.path.insert(0, str(HERE))
+sys.path[:0] = [str(HERE), str(HERE / "python")]
 from planning.operation import NotUnderstood, read_operations, summarize  # noqa: E402
 from sheet.script import Arguments, number_from, reading, refuse, refuse_missing  # noqa: E402
 from sheet.script import run as run_script  # noqa: E402
 
 try:
     import numpy as np
+    from repose.programs import find_program, mpi_environment
 except ImportError as missing:
     refuse_missing(missing, "apt-get install --no-install-recommends python3-numpy")
 
@@ -75,13 +76,6 @@ WRITTEN = ("skin.ply", "skull.ply", "maxilla.ply", "skull_and_maxilla.ply", "man
 INWARDS = {"le_fort_1": ((0, 1), (1, 0)), "genioplasty": ((0.42, 0.91),)}
 # Template → mm: half the width of the cut, its length behind the pivot, and its height above that.
 EXTENT = {"le_fort_1": (30, 50, 28), "genioplasty": (20, 20, 15)}
-
-
-def program(name):
-    """A program of the build folder beside this script, of REPOSE_BUILD, or on the path."""
-    folders = [os.environ.get("REPOSE_BUILD", ""), HERE.parent / "build"]
-    found = [pathlib.Path(folder) / "bin" / name for folder in folders if folder]
-    return next((str(path) for path in found if path.exists()), name)
 
 
 def run(*command):
@@ -257,10 +251,11 @@ def extract_labels(labels, folder, work, with_skin):
         for role, names in roles.items():
             print(f"{role}: {', '.join(names)}", flush=True)
             segmentation.write(names, map_file)
-            run(program("repose-isosurface"), map_file, "-label", 1, "-largest", "-voxel", 2, "-output",
+            run(find_program("repose-isosurface"), map_file, "-label", 1, "-largest", "-voxel", 2, "-output",
                 folder / f"{role}.ply")
         return
-    run(program("repose-isosurface"), labels, "-labels", "-largest", "-voxel", 2, "-output", work / "label.ply")
+    run(find_program("repose-isosurface"), labels, "-labels", "-largest", "-voxel", 2, "-output",
+        work / "label.ply")
     meshes = {file: bounds(file) for file in work.glob("label_*.ply")}
     size = {file: (high - low).prod() for file, (low, high, _) in meshes.items()}
     skull = max(size, key=size.get)
@@ -276,7 +271,7 @@ def extract_labels(labels, folder, work, with_skin):
 def extract_bones(volume, options, folder):
     """Skull and mandible of a CT, taken apart from points in each, proposed or given."""
     points = ["-apart", *options.apart] if options.apart else ["-jaw"]
-    run(program("repose-isosurface"), volume, "-level", options.bone, *points, "-largest", "-voxel", 2,
+    run(find_program("repose-isosurface"), volume, "-level", options.bone, *points, "-largest", "-voxel", 2,
         "-output", folder / "bone.ply")
     (folder / "bone_1.ply").rename(folder / "skull.ply")
     (folder / "bone_2.ply").rename(folder / "mandible.ply")
@@ -362,15 +357,8 @@ def arguments():
     return chosen
 
 
-def mpi_environment():
-    """Lets mpirun work as root, as in a container, and libraries leave the cores to the ranks."""
-    for name in ("OMPI_ALLOW_RUN_AS_ROOT", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "OMP_NUM_THREADS",
-                 "OPENBLAS_NUM_THREADS"):
-        os.environ.setdefault(name, "1")
-
-
 def main():
-    mpi_environment()
+    os.environ.update(mpi_environment(os.environ))
     options, begin = arguments(), time.monotonic()
     folder, volume = options.output, options.volume
     labels = volume if options.segmented else options.labels
@@ -392,22 +380,22 @@ def main():
     else:
         extract_bones(volume, options, folder)
     if not options.segmented:
-        run(program("repose-isosurface"), volume, "-level", options.level, "-core", options.level + CORE,
+        run(find_program("repose-isosurface"), volume, "-level", options.level, "-core", options.level + CORE,
             "-largest", "-output", folder / "skin.ply")
     whole = folder / "skull_and_maxilla.ply"
-    run(program("repose-landmarks"), folder / "skin.ply", "-skull", whole if whole.exists() else folder / "skull.ply",
-        "-mandible", folder / "mandible.ply", "-output", folder / "landmarks")
+    run(find_program("repose-landmarks"), folder / "skin.ply", "-skull",
+        whole if whole.exists() else folder / "skull.ply", "-mandible", folder / "mandible.ply", "-output", folder / "landmarks")
     bones = [name for name in ("skull", "maxilla", "mandible") if (folder / f"{name}.ply").exists()]
     scene = folder / "scene.yaml"
     scene.write_text(scene_text(operations, options.edge, bones))
     if options.propose:
-        run(program("repose-solve"), scene, "-dry_run")
+        run(find_program("repose-solve"), scene, "-dry_run")
     picture = draw(HERE / "proposal.py", scene, "-output", folder / "proposal.png")
     print(f"proposed: {scene}, {folder / 'landmarks.svg'}{picture} ({time.monotonic() - begin:.0f} s): check "
           "the pictures", flush=True)
     if options.propose:
         return
-    status = run("mpirun", "-n", options.ranks, program("repose-solve"), scene, "-output",
+    status = run("mpirun", "-n", options.ranks, find_program("repose-solve"), scene, "-output",
                  folder / "face")
     picture = draw(HERE / "render.py", folder / "face", "-output", folder / "face.png")
     sheet = draw(HERE / "report.py", folder / "face", "-scene", scene, "-output", folder / "face.html")

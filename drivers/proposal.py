@@ -32,17 +32,14 @@ SHORT = {"nasion_bone": "N", "nasal_spine": "ANS", "a_point": "A", "upper_inciso
 
 
 def run(*command):
-    try:
-        done = subprocess.run([str(word) for word in command], capture_output=True, text=True)
-    except OSError as reason:
-        refuse(f"{command[0]}: {reason.strerror}; build Repose, or set REPOSE_BUILD to its build folder")
+    done = subprocess.run([str(word) for word in command], capture_output=True, text=True)
     if done.returncode:
         refuse(done.stderr.strip() or f"{command[0]} ended with status {done.returncode}")
 
 
 def parts_of(file, work):
     """(mesh, mesh where it goes or None) of each bone and piece after the cuts."""
-    run(plan.program("repose-osteotomy"), file, "-moved", "-output", work / "cut")
+    run(plan.find_program("repose-osteotomy"), file, "-moved", "-output", work / "cut")
     found = {made.stem: render.read_mesh(made) for made in sorted(work.glob("cut_*.ply"))}
     return [(mesh, found.get(f"{name}_moved")) for name, mesh in found.items()
             if not (name.endswith("_moved") and name.removesuffix("_moved") in found)]
@@ -216,7 +213,7 @@ def main():
     with tempfile.TemporaryDirectory() as folder:
         work = pathlib.Path(folder)
         parts = parts_of(file, work)
-        run(plan.program("repose-solve"), file, "-dry_run", "-output", work / "model")
+        run(plan.find_program("repose-solve"), file, "-dry_run", "-output", work / "model")
         solved = render.read_mesh(work / "model_solved_skin.ply")
         incisions = incisions_of(work / "model_incisions.mrk.json")
     skin = render.read_mesh(file.parent / scene["skin"])

@@ -2,7 +2,6 @@
 their transforms are moved (docs/guide/slicer.md). Nothing is compiled or installed into Slicer; the
 solver is the program repose-live."""
 
-import os
 import pathlib
 import sys
 
@@ -97,9 +96,7 @@ class SlicerView:
 
 def start(scene, status):
     """Starts repose-live for a scene file and shows its nodes; returns the follower."""
-    build = os.environ.get("REPOSE_BUILD")
-    program = str(pathlib.Path(build) / "bin/repose-live") if build else None
-    session = repose.Session(scene, program=program, environment=slicer.util.startupEnvironment())
+    session = repose.Session(scene, environment=slicer.util.startupEnvironment())
     view = SlicerView(session, status)
     view.follower = Follower(session, view)
     return view.follower

@@ -3,6 +3,7 @@
 import os
 import re
 import shutil
+import sys
 
 import h5py
 import numpy as np
@@ -80,6 +81,13 @@ def test_the_panel_finds_its_program(prefix, call, tmp_path):
     assert (result.returncode, result.stderr) == (0, "")
     with h5py.File(tmp_path / "face.h5") as h5:
         assert h5.attrs["command"].decode().startswith(str(prefix / "bin/repose-solve"))
+
+
+def test_a_plan_finds_its_programs(prefix, call, tmp_path):
+    (tmp_path / "ct.mhd").touch()
+    result = call(sys.executable, prefix / "share/repose/plan.py", "ct.mhd", "-operation", "jaw, 5 mm forward",
+                  PATH="/usr/bin:/bin")
+    assert f"$ {prefix / 'bin/repose-isosurface'} ct.mhd" in result.stdout and result.returncode == 1
 
 
 @pytest.mark.long

@@ -16,6 +16,7 @@ from conftest import PROJECT, programs, shipped
 
 sys.path.insert(0, str(PROJECT / "drivers/python"))
 import repose  # noqa: E402
+from repose.programs import find_program, mpi_environment  # noqa: E402
 
 SCENE = PROJECT / "meshes/head_live.yaml"
 A = {"mandible": {"translate": [0, -5, 1], "rotate": [2, 0, 0]}, "maxilla": {"translate": [0, -2, 0]}}
@@ -52,10 +53,17 @@ def test_the_program_of_the_named_build_is_taken(monkeypatch, tmp_path):
     monkeypatch.delenv("REPOSE_LIVE", raising=False)
     monkeypatch.setenv("REPOSE_BUILD", str(tmp_path))
     with pytest.raises(FileNotFoundError, match="REPOSE_BUILD"):
-        repose.session.find_program()
+        find_program()
     (tmp_path / "bin").mkdir()
     (tmp_path / "bin/repose-live").symlink_to(programs() / "repose-live")
-    assert repose.session.find_program() == str(tmp_path / "bin/repose-live")
+    assert find_program() == str(tmp_path / "bin/repose-live")
+
+
+def test_mpirun_starts_more_ranks_than_cores():
+    own = {"PATH": os.environ["PATH"], "OMP_NUM_THREADS": "3"}
+    found = mpi_environment(own)
+    assert found["OMP_NUM_THREADS"] == "3" and "PRTE_MCA_rmaps_default_mapping_policy" in found
+    subprocess.run(["mpirun", "-n", str(os.cpu_count() + 1), "true"], env=found, check=True, timeout=60)
 
 
 @pytest.mark.long

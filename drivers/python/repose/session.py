@@ -5,12 +5,12 @@ import json
 import numbers
 import os
 import pathlib
-import shutil
 import subprocess
 import threading
 
 import numpy as np
 
+from .programs import absolute_program, find_program, mpi_environment
 from .scene import Scene, SceneWatch
 from .verify import Verifier
 
@@ -132,29 +132,6 @@ class Face:
         return mesh
 
 
-def find_program():
-    """repose-live: REPOSE_LIVE, else of REPOSE_BUILD, on the PATH, or built in the project of this file."""
-    if "REPOSE_LIVE" in os.environ:
-        return absolute_program(os.environ["REPOSE_LIVE"], "set REPOSE_LIVE to repose-live")
-    if "REPOSE_BUILD" in os.environ:
-        return absolute_program(os.path.join(os.environ["REPOSE_BUILD"], "bin", "repose-live"),
-                                "set REPOSE_BUILD to the folder that Repose is built in")
-    project = pathlib.Path(__file__).resolve().parents[3]
-    built = map(str, sorted(project.glob("build*/bin/repose-live")))
-    found = shutil.which("repose-live") or next(built, None)
-    if not found:
-        raise FileNotFoundError("repose-live is not found: build or install Repose, or set REPOSE_BUILD")
-    return os.path.abspath(found)
-
-
-def absolute_program(name, remedy, path=None):
-    """The absolute path of a program, as it is started in another folder; FileNotFoundError without it."""
-    found = shutil.which(name, path=path)
-    if not found:
-        raise FileNotFoundError(f"{name}: no such program; {remedy}")
-    return os.path.abspath(found)
-
-
 class Session:
     """A scene that is built once and solved for many plans. A plan is a dictionary
     {piece: {"translate": [x, y, z], "rotate": [x, y, z]}}, mm and degrees (rotation vector about the
@@ -173,9 +150,11 @@ class Session:
             raise ValueError(f"verify_every must be a whole number from 0, not {verify_every!r}")
         path = pathlib.Path(getattr(scene, "path", scene)).resolve()
         command = [absolute_program(str(program), "name repose-live") if program else find_program(), str(path)]
+        surroundings = without_mpi(environment or os.environ)
         if ranks > 1:
-            command = [absolute_program("mpirun", "install Open MPI, or take one rank",
-                                        (environment or os.environ).get("PATH")), "-n", str(ranks), *command]
+            command = [absolute_program("mpirun", "install Open MPI, or take one rank", surroundings.get("PATH")),
+                       "-n", str(ranks), *command]
+            surroundings = mpi_environment(surroundings)
         if niceness:
             command = ["nice", "-n", str(niceness), *command]
         self._watch = SceneWatch(Scene(path)) if path.is_file() else None
@@ -185,8 +164,7 @@ class Session:
                                       verify_every, on_verified)
         self._errors = []
         self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-                                         stderr=subprocess.PIPE, cwd=path.parent,
-                                         env=without_mpi(environment or os.environ))
+                                         stderr=subprocess.PIPE, cwd=path.parent, env=surroundings)
         self._listener = threading.Thread(target=self._listen, daemon=True)
         self._listener.start()
         self._writing, self._waiting, self._last = threading.Lock(), {}, 0

@@ -16,7 +16,7 @@ import tempfile
 import xml.etree.ElementTree
 
 FOLDER = pathlib.Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(FOLDER.parent))
+sys.path[:0] = [str(FOLDER.parent), str(FOLDER.parent / "python")]
 from sheet.ply import Header  # noqa: E402
 from sheet.script import HELP, Unusable as Refusal, reading  # noqa: E402
 from sheet.whole_file import Target  # noqa: E402
@@ -197,27 +197,14 @@ def write_scene(chosen, folder):
 # ----- the solver
 
 
-def solver():
-    """repose-solve: of REPOSE_BUILD, beside this folder when installed, of the build folder here,
-    or on the path."""
-    top = FOLDER.parents[1]
-    homes = [top.parent / "bin", top / "build" / "bin"]
-    if "REPOSE_BUILD" in os.environ:
-        homes = [pathlib.Path(os.environ["REPOSE_BUILD"]) / "bin"]
-    found = shutil.which("repose-solve", path=os.pathsep.join(map(str, homes)))
-    found = found or shutil.which("repose-solve")
-    if not found:
-        raise Refusal("repose-solve is not found; set REPOSE_BUILD to the folder it is built in")
-    return found
-
-
 def accuracy_of(chosen):
     """The accuracy of the search, mm."""
     return max(chosen["accuracy"], PREVIEW) if chosen["preview"] else chosen["accuracy"]
 
 
 def command(chosen, scene):
-    line = [solver(), str(scene), "-output", str(scene.with_name("result")), "-monitor_mm"]
+    from repose.programs import find_program  # needs NumPy
+    line = [find_program("repose-solve"), str(scene), "-output", str(scene.with_name("result")), "-monitor_mm"]
     if chosen["preview"]:
         line += ["-profile", "preview"]
     elif chosen["uncertainty"]:
