@@ -206,12 +206,12 @@ class Sheet {
                 [`${name}: movement, dark is ${largest.toFixed(1)} mm`, view, state, true]))];
   }
 
-  makeStill([title, view, state, fields]) {
+  makeStill([title, view, state, colored]) {
     const {low, high, ramp} = this.viewer.scale, kept = this.skin.fields[state] ?? null;
     this.viewer.setScale({low: 0, high: this.described.largest, ramp: this.described.ramp});
-    this.skin.setField(state, fields ? this.fields.get("movement").states[state] : null);
+    this.skin.setField(state, colored ? this.fields.get("movement").states[state] : null);
     const figure = document.createElement("figure"), image = new Image();
-    image.src = this.viewer.snapshot(480, 480, {view, state, fields: true});
+    image.src = this.viewer.snapshot(480, 480, {view, state});
     image.alt = `${title}, ${view}`;
     figure.append(image, Object.assign(document.createElement("figcaption"), {textContent: title}));
     bySheetId("stills").append(figure);

@@ -22,14 +22,14 @@
 //   pick(event)                  {surface, state, point, triangle, weights, at(values)} under a pointer,
 //                                or null; at() interpolates values of the vertices
 //   mark(name, points, color)    draws small balls joined by a line; none removes them
-//   snapshot(width, height, options)  PNG as a data URL; options {view, state, fields, light}
+//   snapshot(width, height, {view, state})  PNG as a data URL
 //   draw()                       after changes made through `three` ({scene, camera, renderer,
 //                                controls, THREE}), where a gizmo may be added
-//   onHover, onClick, onLook     callbacks: (hit, event), (hit, event), ()
+//   onHover, onClick             callbacks: (hit, event)
 //   onPane                       callback before each pane is drawn: ({state, left, width}, height)
 // Of a surface:
 //   setPositions(state, positions)     new positions, for live updates; setField(state, values or
-//   null, gray) colors it, NaN and where gray is true gray; setStyle({color, opacity, visible, plain, image}); object(state) is
+//   null, gray) colors it, NaN and where gray is true gray; setStyle({color, opacity, visible, image}); object(state) is
 //   the THREE.Mesh, to be moved or given to a gizmo.
 "use strict";
 
@@ -71,7 +71,7 @@ class FaceSurface {
     this.colored = new THREE.MeshStandardMaterial({
       map: viewer.rampTexture, roughness: 0.8, metalness: 0, side: THREE.DoubleSide});
     if (oriented) for (const material of [this.plain, this.colored]) darkenInside(material);
-    this.style = {visible: true, opacity: 1, plain: false};
+    this.style = {visible: true, opacity: 1};
     states.forEach((positions, state) => positions && this.setPositions(state, positions));
   }
 
@@ -131,7 +131,6 @@ class FaceSurface {
       map.needsUpdate = true;
       this.plain.map = map;
     }
-    if ("plain" in style && this.shared.color) this.plain.vertexColors = !style.plain;
     for (const material of [this.plain, this.colored]) {
       material.opacity = this.style.opacity;
       material.transparent = this.style.opacity < 1;
@@ -240,10 +239,7 @@ class FaceViewer {
 
   listen() {
     const {renderer: {domElement: canvas}, controls} = this.three;
-    controls.addEventListener("change", () => {
-      this.draw();
-      this.onLook?.();
-    });
+    controls.addEventListener("change", () => this.draw());
     new ResizeObserver(() => this.draw()).observe(this.element);
     let down = null, waiting = null;
     canvas.addEventListener("pointerdown", event => { down = [event.clientX, event.clientY]; });
@@ -357,17 +353,17 @@ class FaceViewer {
       renderer.setViewport(pane.left, 0, pane.width, height);
       renderer.setScissor(pane.from, 0, pane.to - pane.from, height);
       for (const surface of this.surfaces) surface.drawIn(pane.state);
-      this.drawMarks(pane.state);
+      this.drawMarks();
       this.onPane?.(pane, height);
       renderer.render(scene, camera);
     }
     renderer.setScissorTest(false);
   }
 
-  drawMarks(state) {
+  drawMarks() {
     const {camera} = this.three, size = (camera.top - camera.bottom) / camera.zoom / 130;
     for (const group of this.marks.values()) {
-      group.visible = group.userData.state === undefined || group.userData.state === state;
+      group.visible = true;
       for (const ball of group.children) if (ball.isMesh) ball.scale.setScalar(size);
     }
   }
@@ -399,15 +395,14 @@ class FaceViewer {
     return {surface, state, point: hit.point.toArray(), triangle: corners, weights: shares, at};
   }
 
-  // Small balls at points, joined by a line; `state`: drawn with this state only.
-  mark(name, points, color = "#1f6fb4", state = undefined) {
+  // Small balls at points, joined by a line.
+  mark(name, points, color = "#1f6fb4") {
     const {scene} = this.three;
     if (this.marks.has(name)) scene.remove(this.marks.get(name));
     this.marks.delete(name);
     if (points?.length) {
       const group = new THREE.Group(), places = points.map(point => new THREE.Vector3(...point));
       const material = new THREE.MeshBasicMaterial({color, depthTest: false, transparent: true});
-      group.userData.state = state;
       for (const place of places) {
         const ball = new THREE.Mesh(new THREE.SphereGeometry(1, 16, 12), material);
         ball.position.copy(place);
@@ -423,7 +418,7 @@ class FaceViewer {
     this.draw();
   }
 
-  snapshot(width, height, {view = "front", state = 0, fields = false} = {}) {
+  snapshot(width, height, {view = "front", state = 0} = {}) {
     const {renderer, scene, camera, controls} = this.three;
     const kept = {position: camera.position.clone(), zoom: camera.zoom,
                   target: controls.target.clone()};
@@ -433,18 +428,10 @@ class FaceViewer {
     renderer.setSize(width, height, false);
     renderer.setViewport(0, 0, width, height);
     this.aim(width, height);
-    for (const surface of this.surfaces) {
-      surface.drawIn(state);
-      const mesh = surface.object(state);
-      if (mesh && !fields) mesh.material = surface.plain;
-    }
+    for (const surface of this.surfaces) surface.drawIn(state);
     for (const group of this.marks.values()) group.visible = false;
     renderer.render(scene, camera);
     const url = renderer.domElement.toDataURL("image/png");
-    for (const surface of this.surfaces) {
-      const mesh = surface.object(state);
-      if (mesh && surface.fields[state]) mesh.material = surface.colored;
-    }
     camera.position.copy(kept.position);
     camera.zoom = kept.zoom;
     controls.target.copy(kept.target);
