@@ -426,7 +426,8 @@ def write(plans, norms, scene, appearance, frame):
 <section class="screen"><h2>Landmarks</h2>{landmarks}</section>
 {"".join(folded([(plan.name, plan.result) for plan in plans], scene))}
 </main>"""
-    return web_page(title, body, ("viewer.css", "sheet.css"), ("three.js", "viewer.js", "pack.js", "sheet.js"), words, packed)
+    return web_page(title, body, ("viewer.css", "sheet.css"), ("three.js", "viewer.js", "pack.js", "plan.js", "sheet.js"),
+                    words, packed)
 
 
 __all__ = ["BEYOND", "Plan", "spoken", "write"]

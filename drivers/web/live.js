@@ -3,10 +3,9 @@
 // Where no derivatives are known, the face of the former plan stays and is marked as such.
 "use strict";
 
-const byId = id => document.getElementById(id);
 const TOKEN = new URLSearchParams(location.search).get("token");
 const COMPONENTS = ["tx", "ty", "tz", "rx", "ry", "rz"];
-const BEFORE = 0, NOW = 1, KEPT = 2;
+const KEPT = 2;  // a state of the view beside BEFORE and NOW
 const NOTICE_TIME = 5000;  // ms
 const ROUNDING = 1e-9;     // mm or degrees
 const isSame = (one, other) => JSON.stringify(one) === JSON.stringify(other);
@@ -37,6 +36,7 @@ class Planner {
   constructor({head, arrays}) {
     this.head = head;
     this.pieces = new Map(head.pieces.map(piece => [piece.name, piece]));
+    this.centroids = Object.fromEntries(head.pieces.map(({name, centroid}) => [name, centroid]));
     this.scenePlan = Object.fromEntries(head.pieces.map(({name, translate, rotate}) =>
       [name, {translate, rotate}]));
     this.plan = copyOf(this.scenePlan);
@@ -233,24 +233,11 @@ class Planner {
     this.showHistory();
     this.placeHandle();
     this.showNumbers();
-    this.moveBones();
+    moveBones(this.bones, this.plan, this.centroids);
     byId("under").textContent = byId("written").textContent = "";
     byId("angles").style.visibility = "hidden";
     this.preview();
     this.solveSoon();
-  }
-
-  moveBones() {
-    this.bones.forEach(bone => {
-      const piece = this.pieces.get(bone.name);
-      if (!piece) return;
-      const rows = matrixOf(this.plan[bone.name], piece.centroid);
-      const matrix = new THREE.Matrix4().set(...rows.flat());
-      const mesh = bone.object(NOW);
-      mesh.matrixAutoUpdate = false;
-      mesh.matrix.copy(matrix);
-      mesh.matrixWorldNeedsUpdate = true;
-    });
   }
 
   preview() {
@@ -297,7 +284,7 @@ class Planner {
     this.position = this.follow(position);
     this.skin.setPositions(NOW, this.position);
     this.color();
-    this.drawProfile();
+    showProfile(this, this.head.axes);
   }
 
   // The positions that are shown: of the scene's own skin, carried along, where another is solved.
@@ -365,13 +352,9 @@ class Planner {
     const colored = byId("colored").checked, now = this.movement(this.position);
     const kept = this.kept && this.movement(this.kept);
     const farthest = (values, least) => values.reduce((most, v) => Math.max(most, v), least);
-    const high = Math.ceil(farthest(kept ?? [], farthest(now, 1)));
-    byId("high").textContent = String(high);
-    byId("bar").hidden = !colored;
-    this.viewer.setScale({low: 0, high});
+    showScale(this.viewer, Math.ceil(farthest(kept ?? [], farthest(now, 1))), colored);
     this.skin.setField(NOW, colored ? now : null);
     if (kept) this.skin.setField(KEPT, colored ? kept : null);
-    drawRamp(byId("ramp"), this.viewer.scale.ramp);
     this.viewer.draw();
   }
 
@@ -386,14 +369,6 @@ class Planner {
     const shift = hit.at(position, 3).map((x, a) => x - hit.at(this.initial, 3)[a]);
     return (hit.state === NOW && this.former ? "former plan: " : "") +
       shiftInWords(alongHead(this.head.axes, shift));
-  }
-
-  drawProfile() {
-    const {axes} = this.head, middle = alongHead(axes, this.viewer.center.toArray())[0];
-    const profile = position => profileOf(turned(axes, position), this.triangles, middle);
-    this.profileBefore ??= profile(this.initial);
-    const said = drawProfiles(byId("profile"), this.profileBefore, profile(this.position));
-    byId("measured").textContent = said && `; ${said}`;
   }
 
   keep() {

@@ -3,8 +3,6 @@
 // drivers/python/repose/kriging.py and map.py.
 "use strict";
 
-const byId = id => document.getElementById(id);
-const BEFORE = 0, NOW = 1;
 const SMALLEST = 0.05;   // mm or degrees: a number that moves less has no slider
 const MOST_ERROR = 0.5;  // mm: beyond, the face is gray
 
@@ -76,7 +74,6 @@ class MapPage {
     this.shapes = described.skin.shapes.map(one => unpack(bytes, one));
     this.factor = unpack(bytes, described.skin.factor);
     this.failed = doubles(bytes, described.failed);
-    this.centroids = described.centroids;
     this.below = described.bounded ? "below" : "about";
     this.makeView(bytes);
     this.makeSliders();
@@ -189,25 +186,11 @@ class MapPage {
     this.bound = this.factor.map(factor => Math.max(factor * spread, this.described.least_bound));
     this.seconds = (performance.now() - began) / 1000;
     this.skin.setPositions(NOW, this.position);
-    this.moveBones();
+    moveBones(this.bones, this.plan, this.described.centroids);
     this.color();
     this.showNumbers();
     this.showTrust();
-    const {axes} = this.described, middle = alongHead(axes, this.viewer.center.toArray())[0];
-    const profile = position => profileOf(turned(axes, position), this.triangles, middle);
-    this.profileBefore ??= profile(this.initial);
-    const said = drawProfiles(byId("profile"), this.profileBefore, profile(this.position));
-    byId("measured").textContent = said && `; ${said}`;
-  }
-
-  moveBones() {
-    for (const bone of this.bones) {
-      if (!this.centroids[bone.name]) continue;
-      const mesh = bone.object(NOW);
-      mesh.matrixAutoUpdate = false;
-      mesh.matrix.set(...matrixOf(this.plan[bone.name], this.centroids[bone.name]).flat());
-      mesh.matrixWorldNeedsUpdate = true;
-    }
+    showProfile(this, this.described.axes);
   }
 
   showNumbers() {
@@ -264,13 +247,10 @@ class MapPage {
     const values = shown === "bound" ? this.bound : movement;
     const high = shown === "bound" ? MOST_ERROR
       : Math.max(1, Math.ceil(movement.reduce((most, v) => Math.max(most, v), 0)));
-    byId("high").textContent = String(high);
     byId("unit").textContent = shown === "bound" ? `error ${this.below}, mm` : "movement, mm";
-    byId("bar").hidden = shown === "none";
-    this.viewer.setScale({low: 0, high});
+    showScale(this.viewer, high, shown !== "none");
     this.skin.setField(NOW, shown === "none" ? null : values,
                        Array.from(this.bound, value => value > MOST_ERROR));
-    drawRamp(byId("ramp"), this.viewer.scale.ramp);
     this.viewer.draw();
   }
 

@@ -1,5 +1,8 @@
-// A plan in clinical terms, its rigid motions, and the profile of a skin: what live.js and map.js share.
+// What the pages share: a plan in clinical terms, its rigid motions, movements in words, the profile of a skin.
 "use strict";
+
+const byId = id => document.getElementById(id);
+const BEFORE = 0, NOW = 1;  // states of a view
 
 // How numbers are shown: [label, of a placement, axis, sign, unit]. +x left, +y back, +z up.
 const NUMBERS = [
@@ -68,12 +71,25 @@ function movementOf(position, initial) {
   return length;
 }
 
-function shiftInWords(shift) {
-  const [x, y, z] = shift, part = (value, plus, minus) =>
-    Math.abs(value) < 0.05 ? "" : `, ${Math.abs(value).toFixed(1)} ${value > 0 ? plus : minus}`;
-  return `${Math.hypot(...shift).toFixed(2)} mm` + part(-y, "forward", "back") +
-    part(z, "up", "down") + part(x, "to the left", "to the right");
+// Moves the bones of a view as a plan does, whose pieces have these centroids.
+function moveBones(bones, plan, centroids) {
+  for (const bone of bones) {
+    if (!centroids[bone.name]) continue;
+    const mesh = bone.object(NOW);
+    mesh.matrixAutoUpdate = false;
+    mesh.matrix.set(...matrixOf(plan[bone.name], centroids[bone.name]).flat());
+    mesh.matrixWorldNeedsUpdate = true;
+  }
 }
+
+// The parts of a shift that count, in words.
+function partsInWords([x, y, z]) {
+  return [[-y, "forward", "back"], [z, "up", "down"], [x, "to the left", "to the right"]]
+    .filter(([value]) => Math.abs(value) >= 0.05)
+    .map(([value, plus, minus]) => `${Math.abs(value).toFixed(1)} ${value > 0 ? plus : minus}`);
+}
+
+const shiftInWords = shift => [`${Math.hypot(...shift).toFixed(2)} mm`, ...partsInWords(shift)].join(", ");
 
 // Segments of the skin in the plane x = middle, as [y, z, y, z].
 function profileOf(position, triangles, middle) {
@@ -111,11 +127,23 @@ function drawProfiles(svg, before, now) {
     (forward >= 0 ? "forward" : "back");
 }
 
-// Draws the color bar of a viewer's scale.
-function drawRamp(canvas, ramp) {
-  const context = canvas.getContext("2d");
+// Draws the profile of a page through the middle of its view: initially and now.
+function showProfile(page, axes) {
+  const middle = alongHead(axes, page.viewer.center.toArray())[0];
+  const profile = position => profileOf(turned(axes, position), page.triangles, middle);
+  page.profileBefore ??= profile(page.initial);
+  const said = drawProfiles(byId("profile"), page.profileBefore, profile(page.position));
+  byId("measured").textContent = said && `; ${said}`;
+}
+
+// Sets the scale of a viewer, from 0, and draws its color bar.
+function showScale(viewer, high, shown) {
+  byId("high").textContent = String(high);
+  byId("bar").hidden = !shown;
+  viewer.setScale({low: 0, high});
+  const canvas = byId("ramp"), context = canvas.getContext("2d");
   for (let i = 0; i < canvas.width; ++i) {
-    context.fillStyle = `rgb(${rampColor(ramp, i / (canvas.width - 1)).map(Math.round)})`;
+    context.fillStyle = `rgb(${rampColor(viewer.scale.ramp, i / (canvas.width - 1)).map(Math.round)})`;
     context.fillRect(i, 0, 1, canvas.height);
   }
 }

@@ -2,20 +2,10 @@
 // connects the controls. All that is drawn lies in the page; nothing is loaded.
 "use strict";
 
-const bySheetId = id => document.getElementById(id);
-
-function inWords(shift, digits = 1) {
-  const words = [[1, "back", "forward"], [2, "up", "down"], [0, "to the left", "to the right"]];
-  const said = words.filter(([axis]) => Math.abs(shift[axis]) >= 0.5 * 10 ** -digits)
-    .map(([axis, plus, minus]) =>
-      `${Math.abs(shift[axis]).toFixed(digits)} ${shift[axis] > 0 ? plus : minus}`);
-  return said.join(", ") || "stays";
-}
-
 class Sheet {
   constructor(described, bytes) {
     this.described = described;
-    this.viewer = new FaceViewer(bySheetId("view"));
+    this.viewer = new FaceViewer(byId("view"));
     for (const one of described.surfaces) this.addSurface(one, bytes);
     this.skin = this.viewer.surfaces[0];
     this.fields = new Map(described.fields.map(field => [field.name, {
@@ -24,7 +14,7 @@ class Sheet {
     this.viewer.fit(described.frame);
     this.measured = [];
     this.connect();
-    const choice = bySheetId("coloring");
+    const choice = byId("coloring");
     for (const name of this.fields.keys()) choice.add(new Option(this.fields.get(name).label, name));
     this.viewer.look("three-quarter");
     this.setMode("split");
@@ -51,18 +41,12 @@ class Sheet {
 
   // Movement in mm of each vertex in each state after the first, and the difference of two plans.
   addMovement() {
-    const {positions} = this.skin, between = (one, other) => {
-      const distance = new Float32Array(one.length / 3);
-      for (let i = 0; i < distance.length; ++i) distance[i] = Math.hypot(
-        other[3 * i] - one[3 * i], other[3 * i + 1] - one[3 * i + 1],
-        other[3 * i + 2] - one[3 * i + 2]);
-      return distance;
-    };
-    const own = [null, ...positions.slice(1).map(after => between(positions[0], after))];
+    const {positions} = this.skin;
+    const own = [null, ...positions.slice(1).map(after => movementOf(after, positions[0]))];
     const fields = [["movement", {label: "movement, mm", states: own, unit: "mm",
                                   high: this.described.largest}]];
     if (positions.length > 2) {
-      const apart = between(positions[1], positions[2]);
+      const apart = movementOf(positions[2], positions[1]);
       fields.push(["difference", {label: "difference of the plans, mm", unit: "mm",
                                   states: [null, apart, apart], high: this.described.apart}]);
     }
@@ -73,12 +57,12 @@ class Sheet {
   color(name) {
     const field = this.fields.get(name), {ramp} = this.described;
     this.colored = name;
-    bySheetId("coloring").value = name;
-    bySheetId("bar").hidden = !field;
+    byId("coloring").value = name;
+    byId("bar").hidden = !field;
     if (field) {
       const colors = field.ramp ?? ramp;
       this.viewer.setScale({ramp: colors, low: 0, high: field.high || 1});
-      bySheetId("bar").innerHTML = `<b>${field.label}</b>` +
+      byId("bar").innerHTML = `<b>${field.label}</b>` +
         `<i style="background:linear-gradient(90deg,${colors.map(c => `#${c}`).join(",")})"></i>` +
         `<span><span>${field.ends ? field.ends[0] : "0"}</span>` +
         `<span>${field.ends ? field.ends[1] : field.high.toFixed(1)}</span></span>`;
@@ -94,36 +78,36 @@ class Sheet {
     this.mode = mode;
     for (const button of document.querySelectorAll("[data-mode]"))
       button.setAttribute("aria-pressed", button.dataset.mode === mode);
-    bySheetId("share-label").hidden = mode !== "single";
+    byId("share-label").hidden = mode !== "single";
     this.blend();
     this.showStates();
   }
 
-  pair() { return (bySheetId("pair")?.value ?? "0 1").split(" ").map(Number); }
+  pair() { return (byId("pair")?.value ?? "0 1").split(" ").map(Number); }
 
   showStates() {
     const [one, other] = this.pair(), names = this.described.states;
-    const share = Number(bySheetId("share").value);
-    bySheetId("share-from").textContent = names[one];
-    bySheetId("share-to").textContent = names[other];
+    const share = Number(byId("share").value);
+    byId("share-from").textContent = names[one];
+    byId("share-to").textContent = names[other];
     const single = share === 0 ? one : share === 1 ? other : FaceViewer.MIXED;
     this.viewer.show({mode: this.mode, states: this.mode === "single" ? [single] : [one, other]});
-    bySheetId("tag-left").textContent = this.mode !== "single" ? names[one]
+    byId("tag-left").textContent = this.mode !== "single" ? names[one]
       : single === FaceViewer.MIXED ? `${Math.round(100 * share)} % of the way` : names[single];
-    bySheetId("tag-right").hidden = this.mode === "single";
-    bySheetId("tag-right").textContent = names[other];
+    byId("tag-right").hidden = this.mode === "single";
+    byId("tag-right").textContent = names[other];
   }
 
   blend() {
-    const share = Number(bySheetId("share").value);
+    const share = Number(byId("share").value);
     if (this.mode === "single" && share > 0 && share < 1) this.viewer.mix(...this.pair(), share);
   }
 
   tell(hit, event) {
-    const tip = bySheetId("tip");
+    const tip = byId("tip");
     tip.hidden = !hit;
     if (!hit) return;
-    const box = bySheetId("view").getBoundingClientRect();
+    const box = byId("view").getBoundingClientRect();
     tip.textContent = this.sentence(hit);
     tip.style.left = tip.style.top = "0px"; // as wide as it can be
     const left = Math.min(event.clientX - box.left, box.width - tip.offsetWidth - 20);
@@ -140,8 +124,8 @@ class Sheet {
     const shift = to.map((value, axis) => value - from[axis]);
     const plan = names.length > 2 ? `${names[after]}: ` : "";
     const place = surface === this.skin ? "" : `${surface.name}: `;
-    const moves = Math.hypot(...shift) < 0.05 ? "does not move"
-      : `moves ${Math.hypot(...shift).toFixed(1)} mm: ${inWords(shift)}`;
+    const parts = partsInWords(shift).join(", "), moves = Math.hypot(...shift) < 0.05 ? "does not move"
+      : `moves ${Math.hypot(...shift).toFixed(1)} mm${parts && `: ${parts}`}`;
     const unsure = this.fields.get("uncertainty")?.states[after];
     return plan + place + moves +
       (surface === this.skin && unsure ? `; uncertain by ${at(unsure)[0].toFixed(1)} mm` : "");
@@ -149,11 +133,11 @@ class Sheet {
 
   // Two clicks measure a distance; a third begins again.
   measure(hit) {
-    if (!bySheetId("measure").checked || !hit) return;
+    if (!byId("measure").checked || !hit) return;
     if (this.measured.length === 2) this.measured = [];
     this.measured.push(hit);
     this.viewer.mark("distance", this.measured.map(one => one.point), "#1f6fb4");
-    const told = bySheetId("distance");
+    const told = byId("distance");
     if (this.measured.length < 2) {
       told.textContent = "Choose the second point.";
       return;
@@ -169,7 +153,7 @@ class Sheet {
   }
 
   connect() {
-    const on = (id, event, act) => bySheetId(id)?.addEventListener(event, act);
+    const on = (id, event, act) => byId(id)?.addEventListener(event, act);
     for (const button of document.querySelectorAll("[data-view]"))
       button.addEventListener("click", () => this.viewer.look(button.dataset.view));
     for (const button of document.querySelectorAll("[data-mode]"))
@@ -189,7 +173,7 @@ class Sheet {
     on("measure", "change", event => {
       this.measured = [];
       this.viewer.mark("distance", null);
-      bySheetId("distance").textContent = event.target.checked ? "Choose two points of the face." : "";
+      byId("distance").textContent = event.target.checked ? "Choose two points of the face." : "";
     });
     this.viewer.onHover = (hit, event) => this.tell(hit, event);
     this.viewer.onClick = hit => this.measure(hit);
@@ -214,7 +198,7 @@ class Sheet {
     image.src = this.viewer.snapshot(480, 480, {view, state});
     image.alt = `${title}, ${view}`;
     figure.append(image, Object.assign(document.createElement("figcaption"), {textContent: title}));
-    bySheetId("stills").append(figure);
+    byId("stills").append(figure);
     this.viewer.setScale({low, high, ramp});
     this.skin.setField(state, kept);
     this.viewer.draw();
@@ -233,15 +217,15 @@ class Sheet {
 }
 
 (async () => {
-  const described = JSON.parse(bySheetId("described").textContent);
+  const described = JSON.parse(byId("described").textContent);
   try {
-    const sheet = new Sheet(described, await inflate(bySheetId("packed").textContent));
+    const sheet = new Sheet(described, await inflate(byId("packed").textContent));
     window.sheet = sheet;
     document.documentElement.dataset.ready = "yes";
     sheet.makeStills();
   } catch (reason) {
-    bySheetId("no-view").hidden = false;
-    bySheetId("no-view").textContent = reason.message;
+    byId("no-view").hidden = false;
+    byId("no-view").textContent = reason.message;
     document.documentElement.dataset.ready = "failed";
   }
 })();
