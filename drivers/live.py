@@ -241,7 +241,7 @@ def main():
                 server.serve_forever()
     except KeyboardInterrupt:
         print()
-    except (repose.Refused, ValueError) as refusal:
+    except ValueError as refusal:
         refuse(refusal)
 
 

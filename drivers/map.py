@@ -240,7 +240,7 @@ def main():
             (solve_plan if chosen.plan else make_page)(chosen, session, box, store)
     except KeyboardInterrupt:
         refuse("ended; the plans solved so far are kept, and the same command goes on")
-    except (repose.Refused, ValueError) as reason:
+    except ValueError as reason:
         raise Unusable(reason) from None
 
 

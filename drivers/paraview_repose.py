@@ -12,8 +12,6 @@ the scene is shown, displaced as at the end (NAME_given_skin.vtp); "computed ski
 browser is the one with load steps.
 """
 
-import ctypes
-import ctypes.util
 import os
 import shlex
 import sys
@@ -21,7 +19,7 @@ import sys
 IS_SCRIPT = bool(sys.argv) and os.path.basename(sys.argv[0]) == "paraview_repose.py"
 if IS_SCRIPT:
     sys.path.insert(0, os.path.dirname(os.path.abspath(sys.argv[0])))
-    from sheet.script import Unusable, refuse, result_name, run, words
+    from sheet.script import Unusable, has_display, refuse, result_name, run, words
     from sheet.whole_file import Target
 else:  # a macro, which ParaView copies to a folder of its own and whose exit would end ParaView
 
@@ -71,16 +69,6 @@ def require_display():
         GetParaViewVersion() < 6
     if needs_display and not has_display():
         refuse(f"no display: xvfb-run -a pvpython {shlex.join(sys.argv)}")
-
-
-def has_display():
-    """Whether an X server answers at DISPLAY."""
-    library = ctypes.util.find_library("X11")
-    if not library or not os.environ.get("DISPLAY"):
-        return False
-    connect = ctypes.CDLL(library).XOpenDisplay
-    connect.restype = ctypes.c_void_p
-    return bool(connect(None))
 
 
 def view(layout, hint, title):

@@ -39,6 +39,7 @@ import zlib
 HERE = pathlib.Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE), str(HERE / "python")]
 from planning.operation import NotUnderstood, read_operations, summarize  # noqa: E402
+from sheet.ply import Header  # noqa: E402
 from sheet.script import Arguments, number_from, reading, refuse, refuse_missing  # noqa: E402
 from sheet.script import run as run_script  # noqa: E402
 
@@ -180,13 +181,10 @@ class Segmentation:
 
 
 def bounds(file):
-    """Lowest and highest corner, and the vertices, of a binary PLY of repose-isosurface."""
-    data = file.read_bytes()
-    count = int(re.search(rb"element vertex (\d+)", data)[1])
-    kind = "<f8" if b"property double x" in data[:400] else "<f4"
-    start = data.index(b"end_header\n") + len(b"end_header\n")
-    points = np.frombuffer(data, kind, 3 * count, start).reshape(-1, 3)
-    return points.min(0), points.max(0), points
+    """Lowest and highest corner of a PLY file."""
+    vertices = Header(file.read_bytes()).vertices()
+    points = np.stack([vertices[axis] for axis in "xyz"], 1)
+    return points.min(0), points.max(0)
 
 
 EDITED = ("scene.yaml", "landmarks.mrk.json")  # by people: the next run renames them
@@ -257,10 +255,10 @@ def extract_labels(labels, folder, work, with_skin):
     run(find_program("repose-isosurface"), labels, "-labels", "-largest", "-voxel", 2, "-output",
         work / "label.ply")
     meshes = {file: bounds(file) for file in work.glob("label_*.ply")}
-    size = {file: (high - low).prod() for file, (low, high, _) in meshes.items()}
+    size = {file: (high - low).prod() for file, (low, high) in meshes.items()}
     skull = max(size, key=size.get)
     middle = (meshes[skull][0] + meshes[skull][1]) / 2
-    jaws = [file for file, (low, high, _) in meshes.items()
+    jaws = [file for file, (low, high) in meshes.items()
             if (low + high)[1] / 2 < middle[1] and (low + high)[2] / 2 < middle[2]]
     if not jaws:
         refuse(f"{labels}: no label lies before and below the skull; name segments in a .seg.nrrd")

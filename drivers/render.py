@@ -25,7 +25,6 @@ libgl1-mesa-dri; or, without pip, apt-get install --no-install-recommends python
 python3-h5py xvfb xauth. A film needs Pillow, which comes with the former.
 """
 
-import ctypes
 import ctypes.util
 import importlib.util
 import io
@@ -35,7 +34,8 @@ import shutil
 import sys
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from sheet.script import (Arguments, Unusable, number_from, own_names, reading, refuse,  # noqa: E402
+from sheet import RAMP, rounded_up  # noqa: E402
+from sheet.script import (Arguments, Unusable, has_display, number_from, own_names, reading, refuse,  # noqa: E402
                           refuse_missing, result_name, run)
 from sheet.whole_file import Target  # noqa: E402
 
@@ -95,16 +95,6 @@ def arguments():
     return chosen
 
 
-def has_display():
-    """Whether an X server answers at DISPLAY."""
-    library = ctypes.util.find_library("X11")
-    if not library or not os.environ.get("DISPLAY"):
-        return False
-    connect = ctypes.CDLL(library).XOpenDisplay
-    connect.restype = ctypes.c_void_p
-    return bool(connect(None))
-
-
 def vtk_version():
     """(major, minor) of this interpreter's VTK."""
     from vtkmodules.vtkCommonCore import vtkVersion
@@ -137,14 +127,14 @@ def find_screen():
 
 def load_modules():
     """After find_screen."""
-    global h5py, np, vtk, numpy_to_vtk, numpy_to_vtkIdTypeArray, vtk_to_numpy, RAMP, shown_skin
+    global h5py, np, vtk, numpy_to_vtk, numpy_to_vtkIdTypeArray, vtk_to_numpy, shown_skin
     try:
         import h5py
         import numpy as np
         import vtkmodules.all as vtk
         from vtkmodules.util.numpy_support import (numpy_to_vtk, numpy_to_vtkIdTypeArray,
                                                    vtk_to_numpy)
-        from sheet import RAMP, shown_skin
+        from sheet import shown_skin
     except ImportError as missing:
         refuse_missing(missing, INSTALL)
 
@@ -361,16 +351,10 @@ def beside(bones, skin):
     return clip.GetOutput()
 
 
-def round_up(number):
-    """To two digits."""
-    digit = 10.0 ** (np.floor(np.log10(number)) - 1) if number > 0 else 1.0
-    return float(np.ceil(number / digit * (1 - 1e-12)) * digit)
-
-
 def colors(column, numbers):
     """The color table of a column: from 0, or as far inwards as outwards."""
     peak = float(np.abs(numbers).max())
-    largest = 1.0 if column == "region" or peak < ROUNDING else round_up(peak)
+    largest = 1.0 if column == "region" or peak < ROUNDING else rounded_up(peak)
     ramp, low = {"advance": (BOTH, -largest), "region": (REGION, 0.0)}.get(column, (RAMP, 0.0))
     table = vtk.vtkColorTransferFunction()
     for i, text in enumerate(ramp):

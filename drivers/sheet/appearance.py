@@ -53,14 +53,9 @@ def require_of_skin(points, skin, file):
 def read_ply(file):
     """Points and colors of the vertices, None where it has no colors."""
     header = Header(pathlib.Path(file).read_bytes())
-    names = [column[-1] for column in header.columns]
-    if not {"red", "green", "blue"} <= set(names):
+    if not {"red", "green", "blue"} <= {column[-1] for column in header.columns}:
         return None, None
-    if header.is_text:
-        rows = np.array([row[:len(names)] for row in header.rows()[0]], float)
-        vertices = {name: rows[:, k] for k, name in enumerate(names)}
-    else:
-        vertices = np.frombuffer(header.body, header.layout(), header.count)
+    vertices = header.vertices()
     points, colors = (np.stack([vertices[name] for name in three], 1).astype(float)
                       for three in (("x", "y", "z"), ("red", "green", "blue")))
     if not np.isfinite([points, colors]).all():

@@ -5,12 +5,12 @@ import math
 
 import numpy as np
 
-from sheet import RAMP
-from sheet.landmarks import BEYOND, BONES, NEAR, Parts, known_places, place_landmarks
+from sheet import RAMP, rounded_up
+from sheet.landmarks import BONES, NEAR, Parts, known_places, place_landmarks
 from sheet.meshes import Pack, coarser
 from sheet.measures import (following, measured, occlusion, reference, shift_in_words, turns,
                             turns_in_words)
-from sheet.profile import COLORS, complete, cut, drawing, outlines
+from sheet.profile import COLORS, complete, drawing, outlines
 from sheet.shown_skin import matching_rows, rows_of_patient
 from sheet.result import Figure
 from sheet.tables import folded, table, tenths
@@ -160,12 +160,6 @@ def frame(plans):
     points = np.concatenate([states, plans[0].result.skin.before, *bones])
     points = points[(points[:, 2] > low[2] - 5) & (points[:, 2] < high[2] + 150)]
     return points.min(0) - (0, 0, 2), points.max(0) + (0, 0, 2)
-
-
-def rounded_up(number):
-    """To two digits."""
-    digit = 10.0 ** (math.floor(math.log10(number)) - 1) if number > 0 else 1.0
-    return float(math.ceil(number / digit * (1 - 1e-12)) * digit)
 
 
 def state_names(plans):
@@ -428,6 +422,3 @@ def write(plans, norms, scene, appearance, frame):
 </main>"""
     return web_page(title, body, ("viewer.css", "sheet.css"), ("three.js", "viewer.js", "pack.js", "plan.js", "sheet.js"),
                     words, packed)
-
-
-__all__ = ["BEYOND", "Plan", "spoken", "write"]

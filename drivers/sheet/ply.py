@@ -36,6 +36,14 @@ class Header:
         order = "<" if "format binary_little_endian 1.0" in self.lines else ">"
         return np.dtype([(name, order + TYPES[kind]) for kind, name in self.columns])
 
+    def vertices(self):
+        """The values of the vertices by the names of their properties."""
+        import numpy as np
+        if not self.is_text:
+            return np.frombuffer(self.body, self.layout(), self.count)
+        rows = np.array([row[:len(self.columns)] for row in self.rows()[0]], float)
+        return {column[-1]: rows[:, k] for k, column in enumerate(self.columns)}
+
     def rows(self):
         """The words of each vertex in a text body, and what follows them."""
         lines = self.body.split(b"\n", self.count)

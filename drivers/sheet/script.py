@@ -3,6 +3,7 @@ package."""
 
 import argparse
 import contextlib
+import ctypes.util
 import math
 import os
 import sys
@@ -148,3 +149,13 @@ def is_number(text):
         return math.isfinite(float(text))
     except ValueError:
         return False
+
+
+def has_display():
+    """Returns whether an X server answers at DISPLAY."""
+    library = ctypes.util.find_library("X11")
+    if not library or not os.environ.get("DISPLAY"):
+        return False
+    connect = ctypes.CDLL(library).XOpenDisplay
+    connect.restype = ctypes.c_void_p
+    return bool(connect(None))

@@ -547,7 +547,7 @@ def test_the_given_model_comes_back_displaced(program, run, tmp_path):
     (tmp_path / "part.yaml").write_text(shipped("head_jaw_opening.yaml", layers=2, edge=8))
     assert run("repose-solve", "part.yaml", "-accuracy", 1).returncode == 0
     with h5py.File(tmp_path / "part.h5") as h5:
-        points, triangles, arrays = program["skin_to_hand_back"](h5, tmp_path / "part.h5")
+        points, triangles, arrays = program["skin_to_hand_back"](h5)
         reached = h5["step"][sorted(h5["step"])[-1]].attrs["displacement_error"]
     given = read_vtp(tmp_path / "part_given_skin.vtp")
     assert np.array_equal(points, given["Points"] + given["displacement"])

@@ -75,10 +75,6 @@ class PlanMap:
     def bound_at(self, u):
         return np.maximum(self.bound_factor * self.kriging.spread(u)[0], self.least_bound)
 
-    def nearest(self, u):
-        """The row of the solved plan that is nearest, in shares of the box."""
-        return int(np.argmin(np.linalg.norm(self.u - u, axis=1)))
-
 
 def bound_quantile(scores):
     """The 95 % quantile of each column that also holds for one more row: conformal prediction. With

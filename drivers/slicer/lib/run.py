@@ -309,7 +309,7 @@ def vtp_text(points, triangles, arrays):
             + "</Polys>\n</Piece>\n</PolyData>\n</VTKFile>\n")
 
 
-def skin_to_hand_back(h5, result):
+def skin_to_hand_back(h5):
     """Points, triangles and arrays of the predicted skin: of the model that was given, displaced, where
     a remeshed part of it was solved."""
     import numpy as np
@@ -337,7 +337,7 @@ def hand_back(targets, result, numbers):
     with h5py.File(result) as h5:
         step = h5["step"][sorted(h5["step"])[-1]]
         report = dict(step.attrs)
-        points, triangles, arrays = skin_to_hand_back(h5, result)
+        points, triangles, arrays = skin_to_hand_back(h5)
         movement, ratio = arrays["displacement_magnitude"], step["prism/volume_ratio"][:]
         error, mesh_error = report["displacement_error"], report.get("discretisation_error")
         if "predictedSkin" in targets:
