@@ -154,8 +154,6 @@ std::string explain(const CoarseRequest& request, const std::vector<Conflict>& a
   return text;
 }
 
-}  // namespace
-
 /// On rank 0.
 void choose_sensitivity(const base::Options& options, const Job& job, Strategy& s) {
   if (!options.flag("sensitivity")) return;
@@ -199,6 +197,8 @@ void require_volume_term(const base::Options& options, bool solid, model::Volume
           word(term), word(volume), word(term), name);
   }
 }
+
+}  // namespace
 
 Strategy make_strategy(MPI_Comm comm, const base::Options& options, const Job& job) {
   scene::Solve requested = job.requested;

@@ -161,6 +161,11 @@ Moduli moduli(const scene::Elasticity& e) {
   return {shear, e.young * e.poisson / ((1 + e.poisson) * (1 - 2 * e.poisson)) + shear};
 }
 
+double young_modulus(const Moduli& moduli) {
+  const double lame = moduli.volume - moduli.shear;
+  return moduli.shear * (3 * lame + 2 * moduli.shear) / moduli.volume;
+}
+
 std::array<Vec3, 6> corners_of(const Model& model, size_t prism) {
   return base::pick(model.points.position, model.prisms.points[prism]);
 }

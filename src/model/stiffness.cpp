@@ -160,12 +160,10 @@ template <class Add>
 void for_each_stiffness(const Model& model, Add&& add) {
   for (size_t m = 0; m < model.prisms.points.size(); ++m) {
     const double volume = model.prisms.rest_volume[m];
-    double stiffness = 0;
-    if (is_solid(model)) {
-      const double shear = model.prisms.shear_modulus[m], lame = model.prisms.modulus[m] - shear;
-      stiffness = volume * shear * (3 * lame + 2 * shear) / (lame + shear);
-    }
-    add(model.prisms.points[m][0], stiffness, volume);
+    const double young =
+        is_solid(model) ? young_modulus({model.prisms.shear_modulus[m], model.prisms.modulus[m]})
+                        : 0;
+    add(model.prisms.points[m][0], young * volume, volume);
   }
   for (size_t j = 0; j < model.springs.points.size(); ++j) {
     const auto [p, q] = model.springs.points[j];

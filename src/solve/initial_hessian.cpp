@@ -11,13 +11,13 @@ using base::check;
 
 namespace {
 
-struct Wanted {
+struct LmvmOptions {
   PetscInt initial = 0;  // of choices
   PetscReal price = 12;  // of a renewal, in iterations
 };
 
 /// PETSc's way, so that `-help petsc` lists them.
-PetscErrorCode read_options(MPI_Comm comm, Wanted& requested) {
+PetscErrorCode read_options(MPI_Comm comm, LmvmOptions& requested) {
   const char* const choices[] = {"diagonal", "stiffness"};
   PetscFunctionBegin;
   PetscOptionsBegin(comm, nullptr, "Initial Hessian of limited-memory BFGS", "");
@@ -30,8 +30,8 @@ PetscErrorCode read_options(MPI_Comm comm, Wanted& requested) {
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-Wanted requested_by_options(MPI_Comm comm, bool solid = false) {
-  Wanted requested;
+LmvmOptions requested_by_options(MPI_Comm comm, bool solid = false) {
+  LmvmOptions requested;
   if (solid) requested.initial = 1;
   base::check_options(read_options(comm, requested));
   return requested;

@@ -96,7 +96,7 @@ discrete::Part solid_stiffness_part(discrete::Part part) {
   std::map<std::array<int64_t, 2>, double> share;  // Σ E V / 15, N·mm
   for (size_t m = 0; m < model.prisms.points.size(); ++m) {
     const double shear = model.prisms.shear_modulus[m], lame = model.prisms.modulus[m] - shear;
-    const double young = shear * (3 * lame + 2 * shear) / (lame + shear);
+    const double young = model::young_modulus({shear, model.prisms.modulus[m]});
     for (const auto& [a, b] : model::prism_pairs) {
       const int64_t p = model.prisms.points[m][a], q = model.prisms.points[m][b];
       share[{std::min(p, q), std::max(p, q)}] += young * model.prisms.rest_volume[m] / pairs;

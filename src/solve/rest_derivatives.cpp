@@ -86,13 +86,13 @@ class StrataForces {
       share_.push_back(model::strata_shares(thickness, model::depth_of(model, prism, skin)));
   }
 
-  /// N, of a stratum on all local points, into `slope`. Not collective.
-  void restrict_to_owned(size_t stratum, Vec slope) const {
+  /// Those of a stratum on the unknowns, N. Not collective.
+  void assemble(size_t stratum, Vec forces) const {
     std::vector<Vec3> force(positions().local().size(), Vec3::Zero());
     for (size_t m = 0; m < share_.size(); ++m)
       if (share_[m][stratum] > 0 && is_of_strata(m)) add(m, share_[m][stratum], stratum, force);
     add_supports(stratum, force);
-    positions().restrict_to_owned(force, slope);
+    positions().restrict_to_owned(force, forces);
   }
 
  private:
@@ -228,7 +228,7 @@ std::optional<Gradient> differentiate(Problem& problem, const discrete::NaturalR
                            std::vector<double>(bodies.gaps().size(), 0.0),
                            std::vector<double>(objective.contact().cut_faces().size(), 0.0)};
     for (size_t s = 0; s < requested.strata.size(); ++s) {
-      strata.restrict_to_owned(s, slope);
+      strata.assemble(s, slope);
       add(fmt::format("tangent_young_{}", s), "mm", unchanged, &Gradient::by_strata);
     }
   }

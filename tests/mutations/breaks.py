@@ -213,14 +213,14 @@ BREAKS = [
     ),
     (
         "touching costs no energy",
-        "value += pairs_.area[c] * (now.value + before);",
-        "value += pairs_.area[c] * before;",
+        "value += pairs_.area[c] * now(c).value;",
+        "value += pairs_.area[c] * std::min(0.0, now(c).value);",
         r"^mechanics\.contact",
     ),
     (
         "the energy jumps where a point touches",
-        "value += pairs_.area[c] * (now.value + before);",
-        "value += pairs_.area[c] * now.value;",
+        "return {-before / (2 * stiffness), 0, 0};",
+        "return {0, 0, 0};",
         r"^mechanics\.contact",
     ),
     (
@@ -249,7 +249,7 @@ BREAKS = [
     ),
     (
         "a body pushes with its first guess for ever",
-        "bodies.set_multipliers(pressure);",
+        "objective_.contact().set_multipliers(objective_.contact().pressures());",
         "",
         r"^solve\.contact",
     ),
@@ -267,7 +267,7 @@ BREAKS = [
     ),
     (
         "the penetration is not told",
-        "for (const double gap : body_contact.gaps()) deepest = std::max(deepest, -gap);",
+        "for (const double gap : objective.contact().bodies().gaps()) deepest = std::max(deepest, -gap);",
         "",
         r"^solve\.contact|^program\.(contact|instruments)",
     ),

@@ -58,7 +58,6 @@ class BodyContact {
   /// Forgets all positions and multipliers.
   void reset(double stiffness);
 
-  bool empty() const { return pairs_.point.empty(); }
   const model::ContactPairs& pairs() const { return pairs_; }
   std::span<const double> multipliers() const { return multiplier_; }
   void set_multipliers(std::span<const double> p) { multiplier_.assign(p.begin(), p.end()); }

@@ -24,8 +24,6 @@ class CutFaceContact {
  public:
   CutFaceContact() = default;
   CutFaceContact(const model::CutFaces& cut_faces, double stiffness);  ///< with local point numbers
-  bool empty() const { return places_.empty(); }
-  double stiffness() const { return stiffness_; }
   void set_stiffness(double stiffness) { stiffness_ = stiffness; }
   std::span<const double> multipliers() const { return multiplier_; }  ///< [W] N/mm²
   void set_multipliers(std::span<const double> p) { multiplier_.assign(p.begin(), p.end()); }

@@ -15,6 +15,7 @@ struct Moduli {
   double volume;  ///< κ = E ν / ((1 + ν)(1 − 2 ν)) + μ
 };
 Moduli moduli(const scene::Elasticity& elasticity);
+double young_modulus(const Moduli& moduli);  ///< N/mm²
 
 /// Share of the depth between a prism's triangles, mm, that each stratum takes; the last is what
 /// lies below all.
