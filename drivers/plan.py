@@ -369,6 +369,8 @@ def main():
     if not labels and options.bone <= options.level:
         refuse(f"-level {options.level:g}: the skin's level must be below that of bone, -bone {options.bone:g}; give both in "
                f"the values of the volume, such as -level {options.level:g} -bone {options.level + BONE - SKIN:g}")
+    for program in ("repose-isosurface", "repose-landmarks", "repose-solve"):
+        find_program(program)  # before a file of an earlier run is removed
     operations = read_or_refuse(options.operation)
     print(f"understood: {summarize(operations)}", flush=True)
     begin_run(folder, operations, inputs)

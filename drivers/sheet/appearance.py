@@ -91,7 +91,9 @@ def read_obj(file, skin):
 
 def rows_of(corner, counts):
     """Rows from 1, or 0 for none, of the place and texture coordinate of a corner of a face; -1 is the last so far."""
-    rows = (int(row or 0) for row in corner.split("/"))
+    rows = [int(row or 0) for row in corner.split("/")]
+    if any(row < -count for row, count in zip(rows, counts)):
+        raise ValueError(f"a face has a vertex that is not there: {corner}")
     return [row if row >= 0 else count + 1 + row for row, count in zip(rows, counts)]
 
 

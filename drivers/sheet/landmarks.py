@@ -12,6 +12,7 @@ import numpy as np
 from sheet.script import Unusable, is_number, reading
 
 RISE = math.radians(14)  # of nasion and upper incisors as seen from the condyles, together
+SAME = 1e-3  # mm: two landmarks of one name nearer than that are one
 NEAR = 5.0  # mm: a landmark farther from skin and bones belongs to neither
 OFF_SURFACE = 15.0  # mm, farther than a landmark is ever placed beside it, as in src/anatomy/same_head.cpp
 BEYOND = "skin beyond the solved part"
@@ -82,7 +83,7 @@ def with_standard_names(landmarks, file):
     for name, position in landmarks:
         key = SPELLINGS.get(plain(name), name)
         apart = np.linalg.norm(renamed.setdefault(key, position) - position)
-        if apart > 1e-3:
+        if apart > SAME:
             raise Unusable(f"{file}: landmarks '{spelled[key]}' and '{name}' are both {key}, {apart:.1f} mm "
                            "apart; remove one of them")
         spelled[key] = name
@@ -102,10 +103,11 @@ def in_lps(frame, position):
 
 
 def once(pairs):
-    """The dictionary of a JSON object; refuses a name with two values."""
+    """The dictionary of a JSON object; refuses a name with two places."""
     found = dict(pairs)
     for name, value in pairs:
-        if found[name] != value:
+        places = [place for place in (value, found[name]) if isinstance(place, list) and len(place) == 3]
+        if len(places) == 2 and np.linalg.norm(np.subtract(*places)) > SAME:
             raise ValueError(f"'{name}' comes twice; remove one of them")
     return found
 

@@ -19,19 +19,37 @@ class NotKeys(Unusable):
         super().__init__(f"{file}: not a scene: it holds no keys such as skin, bones and tissue")
 
 
+class Loader(yaml.SafeLoader):
+    """Reads what the programs read: values of any tag, and texts that look like dates or are = as texts."""
+    yaml_implicit_resolvers = {
+        first: [(tag, form) for tag, form in resolvers if not tag.endswith((":timestamp", ":value"))]
+        for first, resolvers in yaml.SafeLoader.yaml_implicit_resolvers.items()}
+
+    def construct_tagged(self, _, node):
+        if isinstance(node, yaml.ScalarNode):
+            return self.construct_scalar(node)
+        kind = self.construct_mapping if isinstance(node, yaml.MappingNode) else self.construct_sequence
+        return kind(node, deep=True)
+
+
+Loader.add_multi_constructor("!", Loader.construct_tagged)
+# For the programs a tab is a blank, and these break no line.
+BLANKS = str.maketrans("\t\x85\u2028\u2029", "    ")
+
+
 def parse(file, read):
-    """What `read` (yaml.safe_load, yaml.compose) makes of the text of a scene, and the text."""
+    """What `read` (yaml.load, yaml.compose) makes of the text of a scene, and the text."""
     with reading(file, "a scene in YAML"):
-        text = pathlib.Path(file).read_text(encoding="utf-8-sig")
+        text = pathlib.Path(file).read_text(encoding="utf-8-sig").translate(BLANKS)
         try:
-            return read(text), text
+            return read(text, Loader), text
         except yaml.YAMLError as reason:
             raise ValueError(" ".join(str(reason).split())) from None
 
 
 def read_scene(file):
     """The keys of a scene and their values."""
-    scene, _ = parse(file, yaml.safe_load)
+    scene, _ = parse(file, yaml.load)
     if not isinstance(scene, dict):
         raise NotKeys(file)
     return scene
@@ -46,24 +64,39 @@ def named_file(file, key):
     return None
 
 
-def with_moves(file, moves):
-    """The text of a scene with these moves {piece: 4×4 matrix} in place of its own."""
-    root, text = parse(file, yaml.compose)
-    if not isinstance(root, yaml.MappingNode):
-        raise NotKeys(file)
-    if root.flow_style:  # as JSON is
-        root.flow_style = False
-        text = yaml.serialize(root, allow_unicode=True)
-        root = yaml.compose(text)
+def without_moves(root, text):
+    """The lines of a scene without its moves, the number of its first key's line, and how far its keys are indented."""
     lines, last = text.splitlines(), root.end_mark
-    starts = [key.start_mark.line for key, _ in root.value] + [last.line + (last.column > 0)]
-    for (key, _), begin, end in zip(root.value, starts, starts[1:]):
+    starts = [key.start_mark for key, _ in root.value]
+    ends = [mark.line for mark in starts[1:]] + [last.line + (last.column > 0)]
+    for (key, _), begin, end in zip(root.value, starts, ends):
         if key.value == "moves":
             while lines[end - 1].lstrip()[:1] in ("", "#"):  # comments of the next key
                 end -= 1
-            del lines[begin:end]
-    indent = " " * root.start_mark.column
-    rows = [f"{indent}  - {{bone: {json.dumps(piece)}, transform: {json.dumps(matrix)}}}"
+            del lines[begin.line:end]
+    return lines, starts[0].line, starts[0].column
+
+
+def is_whole(lines):
+    """Returns whether lines are YAML without references to what is not there."""
+    try:
+        return yaml.compose("\n".join(lines), Loader) is not None
+    except yaml.YAMLError:
+        return False
+
+
+def with_moves(file, moves):
+    """The text of a scene with these moves {piece: 4×4 matrix} in place of its own. Comments stay, but of JSON and where
+    other keys refer to the former moves."""
+    root, text = parse(file, yaml.compose)
+    if not isinstance(root, yaml.MappingNode) or not root.value:
+        raise NotKeys(file)
+    lines, first, indent = ([], 0, 0) if root.flow_style else without_moves(root, text)
+    if not is_whole(lines):
+        root.flow_style = False
+        root.value = [entry for entry in root.value if entry[0].value != "moves"]
+        lines, first, indent = yaml.serialize(root, allow_unicode=True).splitlines(), 0, 0
+    rows = [f"{' ' * indent}  - {{bone: {json.dumps(piece)}, transform: {json.dumps(matrix)}}}"
             for piece, matrix in moves.items()]
-    lines[starts[0]:starts[0]] = [f"{indent}moves:{'' if rows else ' []'}", *rows]
+    lines[first:first] = [f"{' ' * indent}moves:{'' if rows else ' []'}", *rows]
     return "\n".join(lines) + "\n"

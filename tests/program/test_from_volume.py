@@ -276,10 +276,11 @@ def test_a_damaged_segmentation_is_refused_in_one_line(tmp_path, environment, co
 def rerun(tmp_path, environment):
     """rerun(scene, *options) → (result, names in the folder) of a run whose first program fails, in a folder with the
     files of an earlier run and others."""
-    program = tmp_path / "bin/repose-isosurface"
-    program.parent.mkdir()
-    program.write_text("#!/bin/sh\nexit 1\n")
-    program.chmod(0o755)
+    (tmp_path / "bin").mkdir()
+    for name in ("isosurface", "landmarks", "solve"):
+        program = tmp_path / f"bin/repose-{name}"
+        program.write_text("#!/bin/sh\nexit 1\n")
+        program.chmod(0o755)
     (tmp_path / "plan").mkdir()
     for name in (*plan.WRITTEN, "notes.txt", "label_3.ply"):
         (tmp_path / "plan" / name).write_text(name)
@@ -314,6 +315,13 @@ def test_a_folder_in_which_a_run_is_at_work_is_refused(rerun, tmp_path):
     plan.lock(tmp_path / "plan")
     result, names = rerun(scene_of("Le Fort I, 5 mm forward"))
     assert "plan: another run of this program is at work in it" in result.stderr
+    assert names == {*plan.WRITTEN, "notes.txt", "label_3.ply"}
+
+
+def test_programs_that_are_not_there_are_refused_before_anything_is_removed(rerun, tmp_path):
+    (tmp_path / "bin/repose-solve").unlink()
+    result, names = rerun(scene_of("Le Fort I, 5 mm forward"))
+    assert "bin/repose-solve: no such program" in result.stderr
     assert names == {*plan.WRITTEN, "notes.txt", "label_3.ply"}
 
 

@@ -165,10 +165,11 @@ def test_a_solver_that_is_killed_is_one_line_and_the_next_works(small):
         assert again.solve(PLAN).converged
 
 
-def test_a_solver_that_ends_within_an_array_is_one_line(small, tmp_path):
+@pytest.mark.parametrize("answer", [', "arrays": [{"name": "position", "type": "f4", "shape": [2, 3]}]', ""])
+def test_a_solver_that_ends_within_an_answer_is_one_line(small, tmp_path, answer):
     program, said = tmp_path / "killed", []
-    program.write_text("#!/bin/sh\nread request\nprintf '%s\\n' '{\"id\": 1, \"ok\": true, \"arrays\": [{\"name\": "
-                       "\"position\", \"type\": \"f4\", \"shape\": [2, 3]}]}'\nprintf 12345678\n")
+    program.write_text("#!/bin/sh\nread request\nprintf '%s\\n' '{\"id\": 1, \"ok\": true" + answer +
+                       "}'\nprintf 12345678\n")
     program.chmod(0o755)
 
     def start():

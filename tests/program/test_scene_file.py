@@ -28,6 +28,8 @@ def write(tmp_path, text):
     ("anatomy: {landmarks: 'O''Brien #2.json'}\n", "landmarks", "O'Brien #2.json"),
     ('anatomy: {landmarks: "O\'Brien.json"}\n', "landmarks", "O'Brien.json"),
     ('{"landmarks": "a b.json", "skin": "c.ply"}', "landmarks", "a b.json"),
+    ("anatomy: {landmarks: a b.json\t}\t# the\u2028head\n", "landmarks", "a b.json"),
+    ("--- !scene\nbase: &base {landmarks: !file a.json}\nanatomy: {<<: *base}\nnote: 2024-13-45\n", "landmarks", "a.json"),
     ("landmarks: moves.json\nanatomy: {landmarks: head.json}\n", "landmarks", "head.json"),
     ("skin: {volume: ct.mhd, level: -300}\n", "skin", None), ("skin: a.ply\n", "landmarks", None)])
 def test_a_file_is_that_which_the_scene_names(tmp_path, text, key, name):
@@ -52,6 +54,8 @@ FLUSH = "skin: face.ply\nmoves:\n- bone: jaw\n  translate: [0, 1, 0]\n\n# the ti
     ("--- # a plan\nskin: face.ply\ntissue: {layers: 4}\n...\n", "# a plan"),
     ("  skin: face.ply\n  moves: []\n  tissue: {layers: 4}\n", "  tissue: {layers: 4}"),
     ("skin: face.ply\ntissue: {layers: 4}\nmoves:\n", "skin: face.ply"),
+    ("--- &head\nskin: face.ply\t# \u2028 \nmoves: []\ntissue: {layers: 4}\n", "--- &head"),
+    ("skin: face.ply\nmoves: [{bone: jaw, translate: &v {layers: 4}}]\ntissue: *v\n", "skin: face.ply"),
     ('{"skin": "face.ply", "tissue": {"layers": 4}, "moves": [{"bone": "jaw"}]}', "face.ply")])
 @pytest.mark.parametrize("moves", [{}, {"Kinn: \"ü\"": MATRIX, "jaw": MATRIX}])
 def test_a_scene_with_other_moves_is_the_same_but_for_these(tmp_path, text, kept, moves):

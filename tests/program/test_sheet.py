@@ -200,6 +200,11 @@ def test_two_landmarks_of_one_name_are_refused(tmp_path, name, words):
     assert len(read_landmarks(tmp_path / name)) == 1
 
 
+def test_other_keys_and_places_that_agree_may_come_twice(tmp_path):
+    (tmp_path / "marks.json").write_text('{"note": "x", "note": "y", "a": [0, 0, 0], "a": [0, 0, 0.0005]}')
+    assert list(read_landmarks(tmp_path / "marks.json")) == ["a"]
+
+
 # ----- text as Windows saves it
 
 
@@ -293,6 +298,16 @@ def test_rows_from_the_end_of_a_texture_are_those_so_far(tmp_path):
     shown = read_appearance(tmp_path / "skin.obj", Skin(points, points, np.array([[0, 1, 2], [3, 4, 5]]), np.ones(6)))
     assert shown.skin.before[shown.skin.corners].tolist() == points.reshape(2, 3, 3).tolist()
     assert np.allclose(shown.uv, shown.skin.before[:, :2] / 10)
+
+
+def test_a_row_before_the_first_is_refused(tmp_path):
+    points = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
+    (tmp_path / "face.mtl").write_text("map_Kd photo.png\n")
+    (tmp_path / "photo.png").write_bytes(b"\x89PNG a photograph")
+    lines = [f"v {x} {y} {z}\nvt {x} {y}" for x, y, z in points]
+    (tmp_path / "skin.obj").write_text("\n".join(["mtllib face.mtl", *lines, "f -4/-3 -2/-2 -1/-1"]))
+    with pytest.raises(Unusable, match="skin.obj: .*a vertex that is not there: -4/-3"):
+        read_appearance(tmp_path / "skin.obj", Skin(points, points, np.array([[0, 1, 2]]), np.ones(3)))
 
 
 def test_measures_of_the_profile_do_not_depend_on_the_side():

@@ -321,8 +321,8 @@ class Session:
             while line := self._process.stdout.readline():
                 if line.startswith(b"{"):  # else of a library: UCX, below MPI, complains on standard output
                     self._take_answer(json.loads(line))
-        except ValueError:
-            pass  # no JSON, or an array that the end of the solver has cut off
+        except (KeyError, TypeError, ValueError):
+            pass  # no JSON, no answer, or an array that the end of the solver has cut off
         finally:
             for number in list(self._waiting):
                 self._give(number, None, {})
