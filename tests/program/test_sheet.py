@@ -201,8 +201,8 @@ def test_two_landmarks_of_one_name_are_refused(tmp_path, name, words):
 
 
 def test_other_keys_and_places_that_agree_may_come_twice(tmp_path):
-    (tmp_path / "marks.json").write_text('{"note": "x", "note": "y", "a": [0, 0, 0], "a": [0, 0, 0.0005]}')
-    assert list(read_landmarks(tmp_path / "marks.json")) == ["a"]
+    (tmp_path / "marks.json").write_text('{"note": "x", "note": "y", "a b": [0, 0, 0], "a b": [0, 0, 0.0005]}')
+    assert list(read_landmarks(tmp_path / "marks.json")) == ["a b"]
 
 
 # ----- text as Windows saves it
