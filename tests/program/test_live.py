@@ -60,7 +60,7 @@ def test_the_program_of_the_named_build_is_taken(monkeypatch, tmp_path):
 
 
 def test_mpirun_starts_more_ranks_than_cores():
-    own = {"PATH": os.environ["PATH"], "OMP_NUM_THREADS": "3"}
+    own = {"PATH": os.environ["PATH"], "HOME": os.path.expanduser("~"), "OMP_NUM_THREADS": "3"}
     found = mpi_environment(own)
     assert found["OMP_NUM_THREADS"] == "3" and "PRTE_MCA_rmaps_default_mapping_policy" in found
     subprocess.run(["mpirun", "-n", str(os.cpu_count() + 1), "true"], env=found, check=True, timeout=60)
