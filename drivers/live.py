@@ -125,7 +125,7 @@ class Handler(http.server.BaseHTTPRequestHandler):
             self.reply(204 if overtaken else 409, b"" if overtaken else str(refusal).encode(),
                        "text/plain; charset=utf-8")
         except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
-            self.close_connection = True  # what is left of the body is no request
+            self.close_connection = True  # the rest of the body is no request
             self.reply(400, f"malformed request: {error}\n".encode(), "text/plain; charset=utf-8")
 
     def get(self):

@@ -136,7 +136,7 @@ def same(bone, other):
 
 def described(plans, appearance):
     """What sheet.js needs, and the packed arrays."""
-    pack, solved = Pack(), plans[0].result.solved
+    pack = Pack()
     others = [matched(*plans)] if len(plans) == 2 else []
     skin, fields = packed_skin(plans, appearance, others, pack)
     largest = max(float(plan.result.solved.movement.max()) for plan in plans)
@@ -400,7 +400,6 @@ Point at the skin, or tap it, to read how far it moves.</p>"""
 
 def write(plans, norms, scene, appearance, frame):
     """The page as text; `frame`: whose axes its directions are along."""
-    first = plans[0]
     title = " and ".join(plan.name for plan in plans)
     words, packed = described(plans, appearance)
     message = "".join((f"<h3>{html.escape(plan.name)}</h3>" if len(plans) > 1 else "") +

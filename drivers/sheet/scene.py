@@ -20,7 +20,7 @@ class NotKeys(Unusable):
 
 
 class Loader(yaml.SafeLoader):
-    """Reads what the programs read: values of any tag, and texts that look like dates or are = as texts."""
+    """YAML as the programs read it: tags are ignored, and dates and `=` are texts."""
     yaml_implicit_resolvers = {
         first: [(tag, form) for tag, form in resolvers if not tag.endswith((":timestamp", ":value"))]
         for first, resolvers in yaml.SafeLoader.yaml_implicit_resolvers.items()}
@@ -33,7 +33,7 @@ class Loader(yaml.SafeLoader):
 
 
 Loader.add_multi_constructor("!", Loader.construct_tagged)
-# For the programs a tab is a blank, and these break no line.
+# yaml-cpp takes a tab for a blank, and the others break no line.
 BLANKS = str.maketrans("\t\x85\u2028\u2029", "    ")
 
 

@@ -25,4 +25,4 @@ def web_page(title, body, styles, scripts, described=None, packed=""):
     Scripts read `described`, values of JSON, and `packed`, the text of a Pack, from elements of these ids."""
     data = "" if described is None else DATA.format(described=json.dumps(described).replace("<", "\\u003c"), packed=packed)
     return PAGE.format(title=html.escape(title), style=read_web(*styles), body=body, data=data,
-                       scripts=read_web(*scripts).replace("</script", "<\\/script"))
+                       scripts=read_web(*scripts))

@@ -81,8 +81,8 @@ using Tell = std::function<void(const std::string& line, size_t number, size_t r
 /// Collective.
 Findings measure(const Plan& plan, const Tell& tell);
 
-/// Returns one paragraph for a person: what accuracy costs, what layers and mesh leave, and which
-/// of them to improve first. `usual` is the scene as it stands.
+/// Returns a paragraph: the cost of accuracy, the errors due to layers and mesh, and which of these
+/// to reduce first. `usual` is the scene as it stands.
 std::string conclude(const std::vector<Measurement>& found, const Variant& usual);
 
 /// CSV: a line of names, then one row a measurement.

@@ -182,7 +182,7 @@ def test_a_solver_that_ends_within_an_answer_is_one_line(small, tmp_path, answer
     assert len(said) == 1 and said[0].startswith("repose-live has ended (status 0)"), "it waits without end"
 
 
-def test_what_a_solver_says_last_is_told(small, tmp_path):
+def test_the_last_error_of_a_solver_is_reported(small, tmp_path):
     program = tmp_path / "late"
     program.write_text("#!/bin/sh\nread request\nexec 1>&-\n(sleep 0.3; echo 'error: too late' >&2) &\nexit 1\n")
     program.chmod(0o755)

@@ -5,7 +5,7 @@ import re
 import pytest
 
 from conftest import runner
-from tissue import apart, last, same_face, skin, steps
+from tissue import apart, last, skin, steps
 
 SCENE = """skin: head_skin.ply
 bones:

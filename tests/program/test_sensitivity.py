@@ -5,7 +5,6 @@ import re
 import numpy as np
 import pytest
 
-from conftest import PROJECT
 from tissue import last, model_of
 
 SCENE = """skin: paper_skin.ply

@@ -13,7 +13,6 @@ import pytest
 from conftest import PROJECT, programs, shipped
 
 sys.path.insert(0, str(PROJECT / "drivers/python"))
-import repose  # noqa: E402
 from repose.motion import matrix_of, motion_of  # noqa: E402
 
 RAS = np.array([-1, -1, 1])

@@ -15,7 +15,7 @@ def find_program(name="repose-live"):
         return absolute_program(os.environ["REPOSE_LIVE"], "set REPOSE_LIVE to repose-live")
     if build := os.environ.get("REPOSE_BUILD"):
         return absolute_program(os.path.join(build, "bin", name), "set REPOSE_BUILD to the folder that Repose is built in")
-    top = FILE.parents[3]  # the project, or share of what is installed
+    top = FILE.parents[3]  # the project, or share of an installation
     folders = [top.parent / "bin", *sorted(top.glob("build*/bin")), os.environ.get("PATH", os.defpath)]
     return absolute_program(name, "build or install Repose, or set REPOSE_BUILD", os.pathsep.join(map(str, folders)))
 

@@ -373,7 +373,7 @@ class Session:
     def _end(self):
         try:
             status = self._process.wait(timeout=10)
-            self._listener.join(timeout=2)  # what it said last
+            self._listener.join(timeout=2)  # of the last lines on standard error
         except subprocess.TimeoutExpired:
             status = "unknown"
         message = next((line for line in self._errors if line.startswith("error:")), "")

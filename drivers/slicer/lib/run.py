@@ -333,7 +333,6 @@ def skin_to_hand_back(h5):
 def hand_back(targets, result, numbers):
     """Writes the models that are requested; the numbers for the panel."""
     import h5py
-    import numpy as np
     with h5py.File(result) as h5:
         step = h5["step"][sorted(h5["step"])[-1]]
         report = dict(step.attrs)

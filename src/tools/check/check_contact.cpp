@@ -103,7 +103,7 @@ class Bodies {
     return poses_[body].topLeftCorner<3, 3>() *
            (is_mesh(body) ? Vec3(sample(body, at).head<3>()) : shapes_[body].normal(at));
   }
-  /// mm, by which the distance to a mesh must exceed a gap for the solver to take it as it is.
+  /// mm, by which the B-spline may be less than the distance to a mesh.
   double smoothing() const { return 1.67 * spacing_ + single_to; }
 
  private:
