@@ -32,35 +32,15 @@ void ContactDescent::stiffen(int times) {
   penalty_.set_stiffness(stiffness_);
 }
 
-/// Softens the penalty, which lets points change sides a few at a time.
-void ContactDescent::soften() {
+/// Searches with a softer penalty, which lets points change sides a few at a time, and takes the
+/// pressures there as multipliers, at the full stiffness again.
+Outcome ContactDescent::presolve(Vec displacement, double accuracy) {
   constexpr double softened = 0.25;
   penalty_.set_stiffness(softened * stiffness_);
-}
-
-/// Takes the pressures of a soft search that ended at `displacement` as multipliers, at the full
-/// stiffness again. Returns by how much they change, mm of gaps.
-double ContactDescent::harden(Vec displacement) {
+  const Outcome outcome = minimizer_.presolve(displacement, accuracy);
   objective_.positions().update(displacement);
-  const double left = penalty_.violation();
   penalty_.move_multipliers();
   penalty_.set_stiffness(stiffness_);
-  return left;
-}
-
-/// Searches on the augmented Lagrangian of a soft penalty until the multipliers hardly move.
-Outcome ContactDescent::presolve(Vec displacement, double accuracy) {
-  constexpr int maximum = 5;
-  constexpr double small = 0.05;  // mm of gaps
-  Outcome outcome;
-  int64_t iterations = 0;
-  for (int n = 0; n < maximum; ++n) {
-    soften();
-    outcome = minimizer_.presolve(displacement, accuracy, true);
-    iterations += outcome.iterations;
-    if (harden(displacement) <= std::max(small, accuracy) || outcome.stopped) break;
-  }
-  outcome.iterations = iterations;
   return outcome;
 }
 
@@ -68,7 +48,7 @@ void ContactDescent::slacken(Vec displacement) {
   constexpr double slack = 0.01, roughly = 0.1;  // of the stiffness; mm
   penalty_.set_multipliers({});
   penalty_.set_stiffness(slack * stiffness_);
-  minimizer_.presolve(displacement, roughly, false);
+  minimizer_.presolve(displacement, roughly);
   penalty_.set_stiffness(stiffness_);
 }
 
@@ -76,9 +56,7 @@ ContactDescent::End ContactDescent::approach(Vec displacement, double accuracy,
                                              int64_t& iterations) {
   constexpr double roughly = 0.1, finely = 0.004;  // mm
   objective_.contact().round_bodies(true);
-  soften();
-  const Outcome near = minimizer_.presolve(displacement, std::max(roughly, accuracy), false);
-  harden(displacement);
+  const Outcome near = presolve(displacement, std::max(roughly, accuracy));
   iterations += near.iterations;
   const End end = near.stopped ? End::stopped : programs_.run(displacement, finely, iterations);
   objective_.contact().round_bodies(false);

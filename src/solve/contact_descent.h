@@ -36,8 +36,6 @@ class ContactDescent {
   Outcome presolve(Vec displacement, double accuracy);
   bool release_overlapped(double accuracy);
   bool lead_out(Vec displacement, double accuracy);
-  void soften();
-  double harden(Vec displacement);
 
   discrete::Objective& objective_;
   discrete::Tangent& tangent_;

@@ -33,6 +33,7 @@ double ContactPenalty::violation() {
 }
 
 void ContactPenalty::move_multipliers() {
+  objective_.contact().update_gaps();
   objective_.contact().set_multipliers(objective_.contact().pressures());
 }
 

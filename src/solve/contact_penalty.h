@@ -13,7 +13,7 @@ class ContactPenalty {
   void set_stiffness(double stiffness);  ///< N/mm³; not collective
   discrete::ContactPressures multipliers() const { return objective_.contact().multipliers(); }
   void set_multipliers(const discrete::ContactPressures& to);  ///< those that are missing are 0
-  /// Takes the pressures at the objective's last update as multipliers. Not collective.
+  /// Takes the pressures at the positions' last update as multipliers. Not collective.
   void move_multipliers();
   /// Returns by how much pressures at the positions' last update differ from multipliers, over the
   /// stiffness, mm: the gap where a point presses or slides, what a multiplier still pretends where

@@ -84,11 +84,6 @@ void InitialHessian::renew(Vec displacement) {
   lag_.renew();
 }
 
-void InitialHessian::refresh(Vec displacement) {
-  solver_.refresh(displacement);
-  lag_.renew();
-}
-
 bool InitialHessian::needs_renewal(double force, double length) {
   if (renewals_ != solver_.preconditioner().renewals())
     lag_.renew();  // by an estimate of the distance from rest

@@ -36,8 +36,6 @@ class InitialHessian {
 
   /// Makes it at `displacement`, unless it was made there. Collective.
   void renew(Vec displacement);
-  /// Takes in what touches at `displacement`, and no more. Collective.
-  void refresh(Vec displacement);
   /// As StepLag::observe.
   bool needs_renewal(double force, double length);
 

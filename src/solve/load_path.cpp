@@ -120,8 +120,8 @@ bool LoadPath::predict(Vec displacement, double load) {
 void LoadPath::presolve_softer() {
   for (double bulk = softest_bulk; 2 * bulk < objective_.largest_bulk(); bulk *= bulk_growth) {
     const BulkLimit limit(objective_, tangent_, bulk);
-    result_.iterations +=
-        search_.presolve_within(trial_, std::max(settings_.accuracy, presolved_to));
+    const double distance = std::max(settings_.accuracy, presolved_to);
+    result_.iterations += search_.presolve(trial_, distance).iterations;
   }
 }
 

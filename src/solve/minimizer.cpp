@@ -51,11 +51,11 @@ std::function<bool(const TaoIterate&)> Minimizer::ending(Outcome& outcome) {
   };
 }
 
-Outcome Minimizer::presolve(Vec displacement, double distance, bool near) {
+Outcome Minimizer::presolve(Vec displacement, double distance) {
   if (tao_->method() != Method::preconditioned) return run(displacement, distance);
   test_->begin(distance, StoppingTest::Criterion::gradient, false);
   Outcome outcome;
-  outcome.iterations = tao_->run(displacement, near, ending(outcome));
+  outcome.iterations = tao_->run(displacement, ending(outcome));
   return outcome;
 }
 
@@ -87,7 +87,7 @@ Outcome Minimizer::search_and_finish(Vec displacement, double accuracy) {
   for (const bool may_finish : {true, false}) {
     test_->begin(accuracy, StoppingTest::Criterion::distance, may_finish);
     Outcome found;
-    found.iterations = tao_->run(displacement, false, ending(found));
+    found.iterations = tao_->run(displacement, ending(found));
     outcome = summarize(displacement, accuracy, std::move(found));
     iterations += outcome.iterations;
     // Where Newton steps do not end it, it continues where they led.

@@ -180,17 +180,14 @@ bool TaoSearch::should_restart(int64_t iterations) const {
   return slowed_ || (reason == TAO_DIVERGED_LS_FAILURE && iterations > 1);
 }
 
-int64_t TaoSearch::run(Vec displacement, bool near, Ends ends) {
+int64_t TaoSearch::run(Vec displacement, Ends ends) {
   ends_ = std::move(ends);
   before_ = 0;
   check(TaoSetSolution(tao_, displacement));
   PetscInt iterations = 0;
   do {
-    if (initial_ && near && !slowed_)
-      initial_->refresh(displacement);
-    else if (initial_)
-      initial_->renew(displacement);
-    slowed_ = near = false;
+    if (initial_) initial_->renew(displacement);
+    slowed_ = false;
     check(TaoSolve(tao_));
     check(TaoGetIterationNumber(tao_, &iterations));
     before_ += iterations;

@@ -28,9 +28,9 @@ class TaoSearch {
 
   /// Returns whether the search ends at an iterate; the same on all ranks.
   using Ends = std::function<bool(const TaoIterate&)>;
-  /// Minimizes from `displacement`, in place. `near`: the search begins where the last one ended,
-  /// but for contact. Returns the iterations. What the function or `ends` throws is thrown again.
-  int64_t run(Vec displacement, bool near, Ends ends);
+  /// Minimizes from `displacement`, in place. Returns the iterations. What the function or `ends`
+  /// throws is thrown again.
+  int64_t run(Vec displacement, Ends ends);
 
   Method method() const;
   static bool is_chosen();     ///< the method, by `-tao_type`

@@ -44,11 +44,7 @@ class Minimizer : public RestSearch {
 
   /// Searches until the preconditioned gradient, where there is one, is about `distance` mm long:
   /// no estimate of the distance is made sure. Returns the iterations and whether it was stopped.
-  /// `near`: the search begins where the last one ended, but for contact.
-  Outcome presolve(Vec displacement, double distance, bool near);
-  int64_t presolve_within(Vec displacement, double distance) override {
-    return presolve(displacement, distance, false).iterations;
-  }
+  Outcome presolve(Vec displacement, double distance) override;
 
   /// Estimates the distance to the rest position and ends the search by Newton steps, where these
   /// are short enough; no search of TAO's. `taken`, mm: the full Newton step that led here, or 0.

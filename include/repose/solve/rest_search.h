@@ -62,8 +62,8 @@ class RestSearch {
   /// From `displacement` (changed in place) at the positions' load, to `accuracy` mm. Collective.
   virtual Outcome run(Vec displacement, double accuracy) = 0;
   /// Comes within about `distance` mm of rest, for another search to continue from there. Returns
-  /// the iterations. Collective.
-  virtual int64_t presolve_within(Vec /*displacement*/, double /*distance*/) { return 0; }
+  /// the iterations and whether it was stopped. Collective.
+  virtual Outcome presolve(Vec /*displacement*/, double /*distance*/) { return {}; }
   /// Searches from a `displacement` that is near to rest. Collective.
   virtual Outcome run_near(Vec displacement, double accuracy) {
     return run(displacement, accuracy);
