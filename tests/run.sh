@@ -1,12 +1,14 @@
 #!/usr/bin/env bash
-# run.sh [--all]: installs missing packages (apt), builds with warnings as errors, checks the formatting and
-# runs the tests; with --all also the long ones. Ends with ctest's summary and what was left out.
+# run.sh [--more | --all]: installs missing packages (apt), builds with warnings as errors, checks the formatting
+# and runs the quick tests; with --more all but the long ones, with --all these, too. Ends with ctest's summary
+# and what was left out.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 case "${1-}" in
-  "") selection=(-LE long) ;;
-  --all) selection=() && export REPOSE_ALL=1 ;;
-  *) echo "run.sh: $1: the only argument is --all" >&2 && exit 1 ;;
+  "") left_out="more|long" && export REPOSE_FEW=1 ;;
+  --more) left_out="long" ;;
+  --all) left_out="" && export REPOSE_ALL=1 ;;
+  *) echo "run.sh: $1: the only arguments are --more and --all" >&2 && exit 1 ;;
 esac
 . drivers/setup.sh
 
@@ -23,11 +25,13 @@ fi
 
 mpi_environment
 status=0
-ctest --preset ci "${selection[@]}" || status=$?
+ctest --preset ci ${left_out:+-LE "$left_out"} || status=$?
 echo "skipped:"
 grep -hE '^(\[  SKIPPED \] [^ ]+$|SKIPPED \[)' build-ci/Testing/Temporary/LastTest.log | sort | uniq || echo "  nothing"
-if [ ${#selection[@]} -gt 0 ]; then
-  echo "left out: $(ctest --preset ci -N -L long | sed -n 's/^ *Test *#[0-9]*: //p' | paste -sd' ')" \
-    "and some tests of $(grep -lE 'pytest.mark.long|RUNS_ALL' tests/program/test_*.py | wc -l) files: tests/run.sh --all"
+if [ -n "$left_out" ]; then
+  deselected=$(awk 'match($0, /[0-9]+ deselected/) {n += substr($0, RSTART)} END {print n + 0}' \
+    build-ci/Testing/Temporary/LastTest.log)
+  echo "left out: $(ctest --preset ci -N -L "$left_out" | sed -n 's/^ *Test *#[0-9]*: //p' | paste -sd' ')" \
+    "and $deselected tests of the others: tests/run.sh --all"
 fi
 exit $status

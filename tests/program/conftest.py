@@ -10,6 +10,7 @@ import subprocess
 import pytest
 
 RUNS_ALL = bool(os.environ.get("REPOSE_ALL"))  # tests/run.sh --all
+RUNS_FEW = bool(os.environ.get("REPOSE_FEW"))  # tests/run.sh
 PROJECT = pathlib.Path(__file__).resolve().parents[2]
 TIME_LIMIT = 120  # seconds
 PATIENCE = float(os.environ.get("REPOSE_PATIENCE", 1))  # limits times this: slow builds
@@ -69,15 +70,18 @@ def can_draw():
 
 def pytest_configure(config):
     config.addinivalue_line("markers", "long: runs only where REPOSE_ALL is set (tests/run.sh --all)")
+    config.addinivalue_line("markers", "quick: runs where REPOSE_FEW is set (tests/run.sh), too")
 
 
 def pytest_collection_modifyitems(config, items):
-    """Deselects the long tests unless REPOSE_ALL is set."""
-    if RUNS_ALL:
-        return
-    long_tests = [item for item in items if item.get_closest_marker("long")]
-    items[:] = [item for item in items if item not in long_tests]
-    config.hook.pytest_deselected(items=long_tests)
+    """Deselects the long tests unless REPOSE_ALL is set, and all but the quick ones where REPOSE_FEW is."""
+    def runs(item):
+        if RUNS_FEW:
+            return item.get_closest_marker("quick") and not item.get_closest_marker("long")
+        return RUNS_ALL or not item.get_closest_marker("long")
+
+    config.hook.pytest_deselected(items=[item for item in items if not runs(item)])
+    items[:] = filter(runs, items)
 
 
 def pytest_sessionfinish(session, exitstatus):

@@ -232,6 +232,7 @@ def test_the_lower_lip_adheres_to_its_teeth_in_a_set_back(run, tmp_path, head):
     assert abs(lips["on", "lower_lip"] - lips["shared", "lower_lip"]) < 0.005
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("head", ["head"], indirect=True)
 def test_tissue_whose_lips_adhere_is_balanced_under_tension(run, tmp_path, head):
     write_scene(tmp_path, "gravity: [0, 0, -9.81]\nmoves: [{bone: mandible, clinical: {advance: 0.01}}]\n",
@@ -292,6 +293,7 @@ def test_a_share_of_the_tissue_of_a_chin_stays_attached_on_any_ranks(run, tmp_pa
     assert attached[0] > attached[1] > 0
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("head", ["head"], indirect=True)
 def test_landmarks_of_another_head_are_refused_in_one_line(run, tmp_path, head):
     for name, place in head.items():

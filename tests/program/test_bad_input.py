@@ -287,6 +287,7 @@ def test_bad_input_is_refused(run, given, case, ranks):
     expect_refusal(run, given.folder, words, "repose-solve", *arguments, ranks=ranks, cwd=given.folder)
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("ranks", [1, 3])
 @pytest.mark.parametrize("name", ["scene.yaml", "model.h5"])
 def test_the_unspoiled_input_is_taken(run, given, name, ranks):

@@ -195,6 +195,7 @@ def write_result(file, functional, volume):
     return file
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("functional, volume", [
     ("energy", "none"), ("energy", "paper"), ("energy", "penalty"),
     ("force", "none"), ("force", "paper")])
@@ -263,6 +264,7 @@ def test_a_distance_may_be_infinite_but_must_be_a_number(run, tmp_path):
         assert run("repose-check", file).returncode == status
 
 
+@pytest.mark.quick
 def test_finds_a_count_that_is_off_by_one_and_a_false_end(run, tmp_path):
     file = write_result(tmp_path / "a.h5", "energy", "none")
     with h5py.File(file, "r+") as h5:
@@ -346,6 +348,7 @@ def test_a_reader_that_goes_away_is_no_fault(run, environment, tmp_path):
     assert process.returncode == 0
 
 
+@pytest.mark.quick
 def test_refuses_what_is_no_result(run, tmp_path):
     refused(run("repose-check", tmp_path / "none.h5"), "none.h5: no such file")
     (tmp_path / "text.h5").write_text("text\n")

@@ -45,6 +45,7 @@ def full_rows(text):
     return {m[1]: [float(n) for n in m.groups()[1:]] for m in re.finditer(pattern, text, re.M)}
 
 
+@pytest.mark.quick
 def test_spheres_two_millimeters_apart(run, tmp_path):
     result = run("repose-compare", sphere(tmp_path / "a.ply", 38), sphere(tmp_path / "b.stl", 40),
                  "-both", "-reach", "3")

@@ -193,6 +193,7 @@ def solve_implant(folder, environment, half_axes, center, forward):
     return done.stdout
 
 
+@pytest.mark.quick
 def test_an_implant_that_comes_out_of_the_chin_pushes_the_tissue_there(folder, environment):
     """docs/guide/surgery.md: an ellipsoid that begins inside the mandible; none of the tissue ends in it."""
     half_axes, center = np.array([14, 5, 6]), np.array([0, -86.2, -60])

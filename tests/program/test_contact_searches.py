@@ -32,6 +32,7 @@ QUICK = {("force", "steps"), ("ntr", "none"), ("lmvm", "restart"), ("cg", "weigh
 REFUSED = {"force": "functional force"}
 
 
+@pytest.mark.quick
 def test_the_quick_pairs_hold_every_feature():
     assert QUICK <= set(PAIRS)
     assert {name for pair in QUICK for name in pair} == {name for group in GROUPS for name in group}

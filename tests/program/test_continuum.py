@@ -7,6 +7,8 @@ from scipy.optimize import brentq
 from continuum import Solid, jacobians, moduli, rest_position, volumes, with_material
 from tissue import prism_volumes
 
+pytestmark = pytest.mark.quick
+
 YOUNG, POISSON = 0.015, 0.45
 MU, KAPPA = moduli(YOUNG, POISSON)
 LOW, HIGH = 0, 3  # mm, of the block

@@ -2,6 +2,7 @@
 its ordinary differential equation, and a block that bends under its own weight against itself."""
 
 import numpy as np
+import pytest
 from scipy.integrate import solve_bvp
 
 from continuum import moduli, with_material
@@ -81,6 +82,7 @@ def outer_radius():
     return found.sol(OUTER)[0]
 
 
+@pytest.mark.quick
 def test_an_inflated_sphere_converges_with_second_order(run, tmp_path):
     exact, errors = outer_radius(), []
     for rounds, layers in (1, 2), (2, 3), (3, 5):

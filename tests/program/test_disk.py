@@ -82,6 +82,7 @@ def without_rights():
         assert ctypes.CDLL(None).prctl(drop_capability, write_anywhere, 0, 0, 0) == 0
 
 
+@pytest.mark.quick
 def test_a_folder_that_may_not_be_written(older, environment, tmp_path):
     folder, _ = older
     folder.chmod(0o555)

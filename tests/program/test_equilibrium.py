@@ -38,6 +38,7 @@ def as_solid(text, preset):
     return text[:text.index("solve:")] + text[text.index("gravity:"):]
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("ranks", [1, 3])
 def test_nothing_moves_under_the_gravity_of_the_recording(solved, posture, ranks):
     file = solved(posture(LYING), "-stability", ranks=ranks)

@@ -70,6 +70,7 @@ def test_every_number_of_every_step_follows_from_the_page(result, contact):
             assert close(value, stored, scale), (name, np.abs(value - stored).max(), scale)
 
 
+@pytest.mark.quick
 def test_adhesion_follows_from_the_page(lips):
     films = adhering(lips)
     points, numbers = lips.elements["adhesion"]

@@ -26,6 +26,7 @@ SPEC.loader.exec_module(plan)
 MAXILLA, SPLIT, JAW, CHIN = "Le Fort I", "sagittal split", "jaw", "genioplasty"
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("text, moves", [
     # each word order, also mixed, with and without units and commas
     ("Le Fort I, 5 mm forward", {MAXILLA: {"advance": 5}}),
@@ -77,6 +78,7 @@ def test_a_text_is_read_as_operations(text, moves):
     assert plan.read_operations(plan.summarize(operations)) == operations
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("text, words", [
     ("nose job, 5 mm up", "'nose' is not understood; name Le Fort I"),
     ("Le Fort I, 5 mm forward, cant 3", "'cant' is not understood"),
@@ -131,6 +133,7 @@ def scene_of(operation, bones=("skull", "mandible")):
     return plan.scene_text(plan.read_operations(operation), 4, bones)
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("operation, kerfs", [
     ("Le Fort I, 5 mm forward", [1]), ("Le Fort I, 5 mm forward, 2 up", [3]), ("Le Fort I, 4 mm back", [5]),
     ("genioplasty, 8 mm forward", [0.5]), ("genioplasty, 4 mm back, 3 mm up", [5.41]), ("BSSO set-back of 5 mm", [0.5]),
@@ -142,6 +145,7 @@ def test_bone_is_taken_out_where_a_piece_moves_towards_it(operation, kerfs):
     assert found == pytest.approx(kerfs, abs=0.01)
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("operation, bones, lines", [
     ("Le Fort I, 5 mm forward, 2 up", ["skull", "mandible"],
      ["template: le_fort_1", "{bone: maxilla, clinical: {advance: 5, impaction: 2}}"]),
@@ -191,6 +195,7 @@ def test_segments_of_slicer_are_known_by_their_names(tmp_path, end):
     assert (tmp_path / "jaw.nrrd").read_bytes().endswith(b"\n\n" + bytes([0, 1, 1, 0, 0, 0, 0, 0]))
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("names, roles", [
     (["Unterkiefer", "Schädel", "Haut", "Oberkiefer", "Zähne unten", "Obere Zähne", "Luft"], "mkhxmx-"),
     (["mâchoire inférieure", "crâne", "peau", "mâchoire supérieure", "Dents du bas", "dents du haut", "air"], "mkhxmx-"),
@@ -311,6 +316,7 @@ def test_a_folder_that_is_used_again_holds_one_run(rerun, options, kept, tmp_pat
     assert {"old_scene.yaml", "old_2_scene.yaml"} <= names, "edits of two runs are kept"
 
 
+@pytest.mark.quick
 def test_a_folder_in_which_a_run_is_at_work_is_refused(rerun, tmp_path):
     plan.lock(tmp_path / "plan")
     result, names = rerun(scene_of("Le Fort I, 5 mm forward"))

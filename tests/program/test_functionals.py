@@ -62,6 +62,7 @@ def test_force_and_energy_meet_after_the_whole_move_of_the_finer_head(solved, tm
     assert np.linalg.norm(last(force)["point/displacement"], axis=1).max() > 5.9
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("ranks", [1, 2])
 def test_check_agrees_with_the_force_functional(run, solved, small, ranks):
     file = solved(small(ADVANCE, True), "-volume", "none", "-functional", "force", ranks=ranks)
@@ -130,6 +131,7 @@ def test_force_takes_no_penalty(run, tmp_path):
     assert not list(tmp_path.glob("*.h5*"))
 
 
+@pytest.mark.quick
 def test_the_removed_volume_term_names_its_replacement(run, tmp_path):
     scene = tmp_path / "old.yaml"
     text = (PROJECT / "meshes" / ADVANCE).read_text().replace(": paper_", f": {PROJECT}/meshes/paper_")

@@ -8,6 +8,8 @@ import pytest
 
 from conftest import PROJECT
 
+pytestmark = pytest.mark.quick
+
 ROOMS = {
     "base": set(),
     "scene": {"base"},

@@ -54,6 +54,7 @@ def test_turgor_opens_the_same_cut_further(run, folder):
     assert gap(closed) < 1e-3, "without tension nothing opens it"
 
 
+@pytest.mark.quick
 def test_without_the_cut_nothing_moves_and_far_away_little_does(run, folder):
     file = cut(run, folder)
     moved = np.linalg.norm(last(file)["point/displacement"], axis=1)

@@ -38,6 +38,7 @@ def call(prefix, environment, tmp_path):
     return run
 
 
+@pytest.mark.quick
 def test_everything_is_there(prefix):
     sources = {p.stem.replace("_", "-") for p in (PROJECT / "drivers").glob("*.cpp")}
     assert {p.name for p in (prefix / "bin").iterdir()} == {f"repose-{name}" for name in sources}
@@ -73,6 +74,7 @@ def test_the_paper_finds_its_heads(call, tmp_path):
     assert (tmp_path / "paper/paper.md").is_file()
 
 
+@pytest.mark.quick
 def test_the_panel_finds_its_program(prefix, call, tmp_path):
     meshes = prefix / "share/repose/meshes"
     result = call(prefix / "share/repose/slicer/Repose", "--skin", meshes / "paper_skin.ply",
@@ -83,6 +85,7 @@ def test_the_panel_finds_its_program(prefix, call, tmp_path):
         assert h5.attrs["command"].decode().startswith(str(prefix / "bin/repose-solve"))
 
 
+@pytest.mark.quick
 def test_a_plan_finds_its_programs(prefix, call, tmp_path):
     (tmp_path / "ct.mhd").touch()
     result = call(sys.executable, prefix / "share/repose/plan.py", "ct.mhd", "-operation", "jaw, 5 mm forward",

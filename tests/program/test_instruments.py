@@ -95,6 +95,7 @@ def test_sliding_skin_is_not_pulled_along_the_ball(run, folder):
     assert np.linalg.norm(force) < np.linalg.norm(stuck)
 
 
+@pytest.mark.quick
 def test_the_shipped_scene_presses_a_cheek(run, tmp_path):
     """Skin around the held points, which pull it along, does not enter the ball either."""
     result = run("repose-solve", PROJECT / "meshes/head_instrument.yaml", "-output", "press")

@@ -71,6 +71,7 @@ def building(folder, environment, **settings):
     return process
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("sent", [signal.SIGTERM, signal.SIGHUP])
 def test_a_signal_before_the_search_leaves_no_file(environment, tmp_path, sent):
     """But for the folder of its own that Open MPI 5 makes in any case. With that, UCX takes SIGHUP."""
@@ -185,6 +186,7 @@ def test_a_time_limit_does_the_same_and_the_run_can_go_on(run, solved, tmp_path)
     assert apart(last(tmp_path / "late.h5"), last(whole)) < 2e-4
 
 
+@pytest.mark.quick
 def test_the_monitor_shows_the_estimate_falling(run, tmp_path):
     scene = PROJECT / "meshes/paper_jaw_advance.yaml"
     result = run("repose-solve", scene, "-monitor_mm", "-accuracy", 1e-6, "-load_steps", 1,

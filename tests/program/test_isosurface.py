@@ -28,6 +28,7 @@ WRITERS = {
 }
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("kind", WRITERS)
 def test_every_format_puts_the_surface_in_its_place(run, tmp_path, kind):
     file = WRITERS[kind](tmp_path, v.samples())

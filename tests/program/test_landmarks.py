@@ -156,6 +156,7 @@ def test_known_landmarks_are_kept(run, tmp_path):
     assert float(mean) < 3 and float(most) < 6
 
 
+@pytest.mark.quick
 def test_a_misspelled_name_is_named(run, tmp_path):
     (tmp_path / "given.csv").write_text("# CoordinateSystem = LPS\npogonion_bonne, 0, -90, -60\nwart, 0, -91, -60\n")
     result = run("repose-landmarks", *SURFACES, "-landmarks", "given.csv")

@@ -96,6 +96,7 @@ def test_another_rest_position_is_looked_for_on_request(session):
         session.ask({"do": "solve", "plan": plan, "other_rest": 1})
 
 
+@pytest.mark.quick
 def test_tangents_predict_a_face_nearby(coarse):
     face = coarse.solve(A, accuracy=0.01, tangents=True)
     assert not face.tangent.missing and len(face.tangent.columns) == 18
@@ -134,6 +135,7 @@ def test_the_gradient_of_a_point_is_the_transpose_of_the_tangents(coarse):
     coarse.change()
 
 
+@pytest.mark.quick
 def test_refusals_name_the_place_and_the_session_goes_on(coarse):
     for plan, words in ((({"mandible": {"translate": [0, -9, 0]}}), "'mandible': translation -9 mm"),
                         (({"jaw": {}}), "'jaw' is no piece"),

@@ -91,6 +91,7 @@ class Cold:
 OTHER = {"distance": 0.61, "place": [7.2, 8, 9]}
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("shift, converged, words", [
     (0.0, True, "the same face within 0.000 mm; at [7, 8, 9] mm tissue has another rest position, 0.61 mm "
                 "away"),
@@ -182,6 +183,7 @@ def test_a_solver_that_ends_within_an_answer_is_one_line(small, tmp_path, answer
     assert len(said) == 1 and said[0].startswith("repose-live has ended (status 0)"), "it waits without end"
 
 
+@pytest.mark.quick
 def test_the_last_error_of_a_solver_is_reported(small, tmp_path):
     program = tmp_path / "late"
     program.write_text("#!/bin/sh\nread request\nexec 1>&-\n(sleep 0.3; echo 'error: too late' >&2) &\nexit 1\n")

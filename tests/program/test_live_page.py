@@ -196,6 +196,7 @@ def served(live, environment, scene):
         server.server_close()
 
 
+@pytest.mark.quick
 def test_angles_are_those_of_the_head_in_any_pose(live, tmp_path):
     skin = meshio.read(PROJECT / "meshes/head_skin.ply")
     marks = json.loads((PROJECT / "meshes/head_landmarks.json").read_text())
@@ -238,6 +239,7 @@ def test_nothing_is_answered_without_the_token(served):
     assert server.server_address[0] == "127.0.0.1"
 
 
+@pytest.mark.quick
 def test_requests_are_answered_or_refused_in_words(served):
     server, address = served
     token = {"X-Token": server.token}

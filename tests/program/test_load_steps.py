@@ -72,6 +72,7 @@ def test_a_path_that_is_one(run, ranks):
     assert 0 < largest_difference(row) <= 0.2  # twice the accuracy
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("options, why", [
     (["-adapt"], "-adapt: the path is to be verified"),
     (["-restart", "a.h5"], "-verify_path: the run resumes from another result")])

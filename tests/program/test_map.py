@@ -61,6 +61,7 @@ def stored_map(scene):
     return box, PlanMap(box, [store.load(u) for u in box.points(SAMPLES)], least_bound=0.05)
 
 
+@pytest.mark.quick
 def test_a_page_is_made_and_says_what_it_rests_on(made):
     scene, message = made
     assert message.returncode == 0, message
@@ -295,6 +296,7 @@ def test_a_failure_of_any_kind_ends_the_run(tmp_path, monkeypatch):
         samples.solve_all("scene.yaml", box, box.points(4), store, 0.1, None, processes=2)
 
 
+@pytest.mark.quick
 def test_a_damaged_sample_is_solved_again(tmp_path):
     store = SampleStore(tmp_path, "key")
     u, values = np.array([0.5, -1]), np.arange(60.0).reshape(20, 3)
@@ -361,6 +363,7 @@ def test_cross_validation_is_that_of_the_fit_without_a_fold():
     assert part.spread(u[~kept]) == pytest.approx(whole.held_out_spread[~kept], rel=1e-6)
 
 
+@pytest.mark.quick
 def test_the_bound_covers_and_failed_plans_are_left_out():
     random = np.random.default_rng(3)
     assert bound_quantile(np.arange(99.0)[:, None]) == 94

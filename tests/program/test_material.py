@@ -192,6 +192,7 @@ def test_paint_beside_the_skin_is_refused(run, tmp_path):
         assert 0.05 * len(skin) < int(found[1]) < int(found[2]) == len(skin) and 25 < float(found[3]) <= 30
 
 
+@pytest.mark.quick
 def test_strata_regions_and_depths(run, tmp_path):
     tissue = """  depths_mm: [0, 1.5]
   material:

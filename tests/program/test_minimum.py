@@ -55,6 +55,7 @@ def found(request, solved, tmp_path_factory):
     return Tissue(model_of(file), volume, weight), step
 
 
+@pytest.mark.quick
 def test_numpy_gradient_is_the_derivative(found):
     tissue, step = found
     random = np.random.default_rng(3)
@@ -66,6 +67,7 @@ def test_numpy_gradient_is_the_derivative(found):
     assert (there - back) / (2 * h) == pytest.approx(slope, rel=1e-6)
 
 
+@pytest.mark.quick
 def test_numbers_of_the_result(found):
     tissue, step = found
     value, gradient = tissue.value_and_gradient(step["point/position"])

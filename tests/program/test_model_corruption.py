@@ -168,6 +168,7 @@ def faults(run, folder, chosen, ranks):
         return [text for text in pool.map(one, chosen) if text]
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("kind", MODELS)
 @pytest.mark.parametrize("ranks", [1, 2])
 def test_the_models_themselves_are_solved(run, tmp_path, kind, ranks):

@@ -69,6 +69,7 @@ def test_any_order_gives_the_same_face(run, face, tmp_path, ranks):
     assert np.linalg.norm(distance, axis=1).max() <= 2 * ACCURACY
 
 
+@pytest.mark.quick
 def test_motion_recovered_from_the_targets(run, face, tmp_path):
     model = model_of(face)
     del model["bone_transform"]

@@ -110,6 +110,7 @@ def test_a_model_file_has_no_coarser_models(head):
     assert refused.returncode == 1 and "does not state its scene" in refused.stderr
 
 
+@pytest.mark.quick
 def test_a_dry_run_says_what_would_be_done_and_why(head):
     def strategy(*options):
         message = head.run("repose-solve", "forward.yaml", "-dry_run", *options)

@@ -7,6 +7,8 @@ import pytest
 from conftest import PROJECT, programs
 from options_page import options_page
 
+pytestmark = pytest.mark.quick
+
 PAGE = (PROJECT / "docs/reference/options.md").read_text(encoding="utf-8")
 SECTIONS = re.findall(r"^## (repose-\w+)\n(.*?)(?=^## |\Z)", PAGE, re.M | re.S)
 OPTIONS = {program: set(re.findall(r"^  -(\w+)", text, re.M)) for program, text in SECTIONS}

@@ -39,6 +39,7 @@ def inputs(tmp_path):
     return {file: file.read_bytes() for file in tmp_path.rglob("*") if file.is_file()}
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("program, arguments, file", [
     ("repose-solve", ["scene.yaml", "-output", "move"], "move.h5"),
     ("repose-solve", ["scene.yaml", "-output", "files/../move"], "files/../move.h5"),

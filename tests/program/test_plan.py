@@ -108,6 +108,7 @@ def test_tangents_by_stiffnesses_are_left_out_with_the_reason(run, scene, tmp_pa
         assert any("young" in name for name in last) != none
 
 
+@pytest.mark.quick
 def test_moves_outside_the_plan_are_refused(run, scene):
     for moves, plan, words in (
             (JAWS % -9, PLAN, "plan.box: 'chin' moves out of it: translation -9 mm along y"),

@@ -126,6 +126,7 @@ def test_a_wrong_input_is_reported_before_it_is_solved(run, tmp_path, case):
     assert any(all(word in line for word in words) for line in lines), result
 
 
+@pytest.mark.quick
 def test_mirrored_landmarks_are_reported(run, tmp_path):
     places = json.loads((PROJECT / "meshes/head_landmarks.json").read_text())
     head, found = Head(tmp_path), []

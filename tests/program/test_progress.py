@@ -128,6 +128,7 @@ def test_a_log_stays_quiet(run, ranks):
     assert result.stderr == "" and "mm to go" not in result.stdout
 
 
+@pytest.mark.quick
 def test_a_volume_shows_its_steps(environment, tmp_path):
     volume = volumes.write_meta(tmp_path / "ct.mha", volumes.samples())
     text = seen([programs() / "repose-isosurface", volume, "-level", "1000"], tmp_path, environment)

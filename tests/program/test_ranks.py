@@ -43,6 +43,7 @@ def check_same(one, many):
             assert difference <= 1e-6 * max(1, np.abs(here[scale]).max())
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("ranks", [2, *(pytest.param(ranks, marks=pytest.mark.long) for ranks in (3, 5))])
 def test_same_face_on_any_number_of_ranks(solved, ranks):
     options = ["paper_jaw_advance.yaml", "-accuracy", "1e-9"]
@@ -158,6 +159,7 @@ def test_what_only_rank_0_knows_is_refused_on_all_ranks(run, tmp_path, ranks):
     assert "error: -verify_path: the tissue may tear; leave the option out" in result.stderr
 
 
+@pytest.mark.quick
 def test_each_rank_builds_its_part_of_springs(run):
     result = run("repose-solve", PROJECT / "meshes/head_springs_advance.yaml", "-dry_run", ranks=2)
     assert result.returncode == 0, result

@@ -29,10 +29,12 @@ def folder(tmp_path_factory):
     return top
 
 
+@pytest.mark.quick
 def test_the_two_scripts_come_first():
     assert COMMANDS[:2] == ["drivers/demo.sh", THIS_RUN]
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("command", [c for c in COMMANDS if c != THIS_RUN])
 def test_command_runs(folder, environment, command):
     if command.startswith(NEEDS_VTK) and not can_draw():
@@ -41,6 +43,7 @@ def test_command_runs(folder, environment, command):
     assert result.returncode == 0, result.stdout + result.stderr
 
 
+@pytest.mark.quick
 def test_the_demo_leaves_what_it_names(folder):
     left = {path.name for path in (folder / "build" / "demo").iterdir()}
     assert {f"head_solid{end}" for end in (

@@ -11,6 +11,8 @@ import pytest
 
 from conftest import PROJECT, TIME_LIMIT, can_draw, finish, shipped
 
+pytestmark = pytest.mark.quick
+
 SCRIPT = PROJECT / "drivers/render.py"
 
 

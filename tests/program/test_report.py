@@ -79,6 +79,7 @@ def page_of(report, tmp_path, file, *options):
     return Page(tmp_path / "page.html")
 
 
+@pytest.mark.quick
 def test_numbers_are_those_of_the_result(report, opened, tmp_path):
     page = page_of(report, tmp_path, opened, "-landmarks", MARKS)
     step, model = last(opened), model_of(opened)
@@ -223,6 +224,7 @@ def test_lips_that_part_are_measured(report, opened, tmp_path):
     assert "Stable: smallest eigenvalue 0.0125 N/mm." in page.text["p"]
 
 
+@pytest.mark.quick
 def test_the_page_stands_alone(report, opened, tmp_path):
     page = page_of(report, tmp_path, opened)
     assert page.links == ["data:,"], "an icon that is none"
@@ -419,6 +421,7 @@ def corner(one, middle, other):
     return math.degrees(math.acos(a @ b / np.linalg.norm(a) / np.linalg.norm(b)))
 
 
+@pytest.mark.quick
 def test_landmarks_and_angles_are_right(report, opened, tmp_path):
     marks = bent(opened, tmp_path / "bent.h5")
     (tmp_path / "marks.json").write_text(json.dumps(marks))
@@ -553,6 +556,7 @@ def test_each_plan_has_its_own_uncertainty(report, opened, other_plan, tmp_path)
     assert state_of(other_plan, tmp_path / "sure.h5") == [False, False, True]
 
 
+@pytest.mark.quick
 def test_two_plans_are_compared(report, opened, other_plan, tmp_path):
     page = page_of(report, tmp_path, opened, other_plan, "-landmarks", MARKS)
     view, step, model = View(tmp_path / "page.html"), last(opened), model_of(opened)

@@ -41,6 +41,7 @@ def shortened(file, copy, keep):
     return copy
 
 
+@pytest.mark.quick
 def test_dry_run_writes_nothing(run, tmp_path):
     result = run("repose-solve", SCENE, "-dry_run")
     assert (result.returncode, result.stderr) == (0, "")
@@ -94,6 +95,7 @@ def test_restart_arrives_at_the_same_face(run, face, tmp_path, keep, ranks):
     assert rest[-1]["load"] == 1 and apart(rest[-1], last(face)) <= 2 * ACCURACY
 
 
+@pytest.mark.quick
 def test_restart_refines_an_end(run, face, tmp_path):
     assert run("repose-solve", SCENE, "-accuracy", 1, "-output", "rough").returncode == 0
     assert apart(last(tmp_path / "rough.h5"), last(face)) > 0.01
@@ -282,6 +284,7 @@ SHOWN = {"tissue": {"displacement (mm)": "point/displacement", "volume_ratio": "
          "skin": {"displacement (mm)": "point/displacement"}}
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("view", VIEWS)
 def test_views_open_as_time_series(face, view):
     with meshio.xdmf.TimeSeriesReader(face.with_name(f"{face.stem}_{view}.xdmf")) as reader:
@@ -318,6 +321,7 @@ def rows_of(item, h5):
     return rows_of(data, h5)[begin:begin + count]
 
 
+@pytest.mark.quick
 def test_blocks_are_named_and_each_bone_is_one(face):
     root = xml.etree.ElementTree.parse(face.with_name(f"{face.stem}_blocks.xdmf")).getroot()
     collections = root.findall("Domain/Grid/Grid")

@@ -9,6 +9,8 @@ import pytest
 
 from conftest import PROJECT, expect_refusal
 
+pytestmark = pytest.mark.quick
+
 DATA = PROJECT.parent / "shared/data/range"
 
 real = pytest.mark.skipif(not DATA.is_dir(), reason=f"no range images: {DATA} is missing")

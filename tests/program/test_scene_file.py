@@ -12,6 +12,8 @@ sys.path.insert(0, str(PROJECT / "drivers"))
 from sheet.scene import named_file, with_moves  # noqa: E402
 from sheet.script import Unusable  # noqa: E402
 
+pytestmark = pytest.mark.quick
+
 MATRIX = [[1, 0, 0, 0], [0, 1, 0, -1.5], [0, 0, 1, 0], [0, 0, 0, 1]]
 
 

@@ -88,6 +88,7 @@ def test_a_missing_file_is_one_line(script, name):
     says(script(name, *arguments), name)
 
 
+@pytest.mark.quick
 def test_springs_are_named_where_a_result_has_none(script, solved):
     pytest.importorskip("matplotlib")
     solid = solved("head_incision.yaml")
@@ -214,6 +215,7 @@ def test_an_option_given_twice_is_named_with_both_values(script, solved, tmp_pat
                              "give it once\n")
 
 
+@pytest.mark.quick
 def test_a_solver_that_is_not_there_is_named(script):
     says(script("live.py", PROJECT / "meshes/head_live.yaml", settings={"REPOSE_LIVE": "bin/none"}), "live.py",
          "bin/none: no such program; set REPOSE_LIVE")
@@ -374,6 +376,7 @@ def test_weights_tell_a_folded_rest_position_from_an_unfinished_search(script, t
     assert ended[6:9] == [["| 1e-9", "NOT CONVERGED"], ["| 1e-6", "folded"], ["| 1e-3", "converged"]]
 
 
+@pytest.mark.quick
 def test_an_interrupt_ends_a_script_in_silence(tmp_path):
     slow = tmp_path / "repose-solve"
     slow.write_text("#!/bin/sh\ntouch started\nexec sleep 60\n")

@@ -77,6 +77,7 @@ def test_face_that_hardly_moves_has_no_numbers(run, folder):
     assert not ROW.search(text)
 
 
+@pytest.mark.quick
 def test_names_hold_the_numbers_of_the_material(run, folder):
     thin = SKIN.replace("1.5", "2").replace("{skin", "{poisson: 0.3, skin")
     text, _, _ = solve(run, folder, SCENE.replace("moves", thin + "moves"), "-sensitivity")

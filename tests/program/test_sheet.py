@@ -30,6 +30,8 @@ from sheet.shown_skin import Skin, matching_rows, rows_of_patient  # noqa: E402
 from sheet.whole_file import Target  # noqa: E402
 from sheet.words import to_html  # noqa: E402
 
+pytestmark = pytest.mark.quick
+
 
 def parted_sheet(n, wide):
     """A flat sheet of n × n vertices with a seam along the middle row, doubled but at its ends: states

@@ -167,6 +167,7 @@ def groups():
     return list(xml.etree.ElementTree.parse(PANEL.with_suffix(".xml")).getroot().iter("parameters"))
 
 
+@pytest.mark.quick
 def test_description_has_the_shape_that_slicer_reads():
     root = xml.etree.ElementTree.parse(PANEL.with_suffix(".xml")).getroot()
     heads = [item.tag for item in root if item.tag != "parameters"]
@@ -255,6 +256,7 @@ def test_round_trip_is_the_scene_that_a_person_would_write(panel, head, run, tmp
         np.linalg.norm(step["point/displacement"][used], axis=1).max(), rel=1e-5)
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("ending", [".tfm", ".h5"])
 def test_transforms_that_itk_writes_move_the_bone(panel, head, tmp_path, ending):
     """By the library that Slicer writes them with: pip install SimpleITK."""
@@ -333,6 +335,7 @@ def test_a_damaged_model_in_ras_is_refused(program, tmp_path):
         program["link"](file, tmp_path, "skin")
 
 
+@pytest.mark.quick
 def test_the_lips_are_the_scenes_mouth_and_a_cut_is_an_incision(panel, head, tmp_path):
     """The solver names what it refuses: so much of a scene that the panel writes is seen."""
     short = slicer_curve(tmp_path / "short.mrk.json", [[47.0, -80.0, 8.0]], "LPS")
@@ -436,6 +439,7 @@ def program():
     return names
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("status", [0, 2])
 @pytest.mark.parametrize("error", [0.05, 0.1, 0.2, np.inf])
 @pytest.mark.parametrize("preview", [False, True])

@@ -204,6 +204,7 @@ def test_a_scene_without_a_plan_is_refused(started):
     assert widget.follower is None and "the scene has no plan" in lines[-1]
 
 
+@pytest.mark.quick
 def test_motions_and_matrices_are_inverse():
     centroid = np.array([3.0, -40, 7])
     for rotate in ([0, 0, 0], [1e-9, 0, 0], [10, -20, 5], [0, 0, 160]):

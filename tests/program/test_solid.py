@@ -54,6 +54,7 @@ def sorted_edges(model):
     return ends[order], model["edge/weight"][order]
 
 
+@pytest.mark.quick
 def test_edges_are_the_integrals(face):
     model = model_of(face[0])
     x, prisms = model["point/position"], model["prism/points"]
@@ -63,6 +64,7 @@ def test_edges_are_the_integrals(face):
     assert abs(found - weights).max() < 1e-12 * abs(weights).max()
 
 
+@pytest.mark.quick
 def test_moduli_are_the_scenes(face):
     file, name = face
     model = model_of(file)
@@ -87,6 +89,7 @@ def test_rest_position_is_the_references(face):
     assert step["objective"] == pytest.approx(solid.value(x), rel=1e-9)
 
 
+@pytest.mark.quick
 def test_residual_force_is_the_energys_slope(face):
     model, step = model_of(face[0]), last(face[0])
     force = -Solid(model).value_and_gradient(step["point/position"])[1]
@@ -95,6 +98,7 @@ def test_residual_force_is_the_energys_slope(face):
     assert step["gradient_max"] == pytest.approx(np.linalg.norm(force, axis=1).max(), rel=1e-3)
 
 
+@pytest.mark.quick
 def test_a_face_at_rest_lying_hangs_upright_as_the_references(run, tmp_path):
     """Skin tension and weight are in balance as recorded, by the edges' weights and the prisms'
     targets in the file; then the weight turns."""

@@ -58,6 +58,7 @@ def test_lmvm_from_the_stiffness_finds_the_same_face_in_few_evaluations(check, s
     assert work(exact) < 2 * work(exact, "iterations")  # full steps, nearly always
 
 
+@pytest.mark.quick
 def test_the_stiffness_is_renewed_where_the_search_has_slowed(solved):
     """In one load step the predicted state, where it is made first, is far from rest."""
     far = ADVANCE, "-accuracy", ACCURACY, "-load_steps", 1, *STIFFNESS, *FACTORS
@@ -66,6 +67,7 @@ def test_the_stiffness_is_renewed_where_the_search_has_slowed(solved):
     assert apart(last(solved(*far)), last(once)) <= 2 * ACCURACY
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("method, prefix", [("ntr", "tao_ntr_"), ("bntr", "tao_bnk_")])
 def test_a_method_that_overwrites_memory_is_refused(run, method, prefix):
     scene = PROJECT / "meshes" / ADVANCE

@@ -61,6 +61,7 @@ REGISTER = ["repose-register", "moving.ply", "fixed.ply", "-landmarks", "moving.
             "fixed.mrk.json"]
 
 
+@pytest.mark.quick
 def test_decimation_prints_and_keeps_its_bound(run, tmp_path):
     result = run("repose-decimate", SKULL, "-distance", "0.7", "-output", "coarse.ply")
     assert (result.returncode, result.stderr) == (0, ""), result
@@ -79,6 +80,7 @@ def test_decimation_to_a_count_prints_its_distance(run, tmp_path):
     assert figure(result.stdout, "bound proven") > 0.5
 
 
+@pytest.mark.quick
 def test_registration_brings_the_mesh_to_its_place_and_back_from_the_file(run, pair):
     result = run(*REGISTER, "-output", "found")
     assert (result.returncode, result.stderr) == (0, ""), result

@@ -59,6 +59,7 @@ def test_parts_are_closed_and_nothing_is_lost(run, folder, head, operation):
     assert total + kerf == pytest.approx(volume(*surface(whole)), abs=0.6)
 
 
+@pytest.mark.quick
 def test_one_bone_from_the_command_line(run, folder):
     result = run("repose-osteotomy", MESHES / "head_mandible.ply", "-point", "0", "-88", "-52",
                  "-normal", "0", "0", "-1", "-piece", "chin", "-kerf", "1.5", cwd=folder)
@@ -124,6 +125,7 @@ def scene_with(folder, text, base="head_jaw_advance.yaml"):
     return "scene.yaml"
 
 
+@pytest.mark.quick
 def test_a_clamped_jaw_stops_at_the_clearance(run, folder):
     scene = (MESHES / "head_jaw_advance.yaml").read_text().replace("[0, -6, 0]", "[0, 0, 9]")
     (folder / "scene.yaml").write_text(scene + "collision: {mode: clamp, clearance: 0.5}\n")
@@ -227,6 +229,7 @@ def test_bad_cuts_are_refused_in_one_line(run, folder, case):
     assert sorted(folder.iterdir()) == before
 
 
+@pytest.mark.quick
 def test_a_planned_landmark_is_reached(run, folder):
     scene = (MESHES / "head_genioplasty.yaml").read_text()
     shutil.copy(MESHES / "head_landmarks.json", folder / "points.json")

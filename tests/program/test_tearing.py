@@ -35,6 +35,7 @@ def edges(cells, sides):
 PRISM = [(0, 1), (1, 2), (2, 0), (3, 4), (4, 5), (5, 3), (0, 3), (1, 4), (2, 5)]
 
 
+@pytest.mark.quick
 def test_what_is_torn_goes_with_its_prisms_and_skin(run, folder):
     solve(run, folder, "whole")
     printed = solve(run, folder, "torn", LIMIT).stdout

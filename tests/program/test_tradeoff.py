@@ -31,6 +31,7 @@ def folder(tmp_path_factory, environment):
     return top
 
 
+@pytest.mark.quick
 def test_every_way_is_there_once(folder):
     found = [(row["study"], row["method"], row["accuracy_mm"], row["volume"], row["load_steps"],
               row["layers"]) for row in rows(folder / "few.csv")]
@@ -66,6 +67,7 @@ def test_a_coarser_mesh_is_further_from_the_reference(folder):
     assert 0.1 < float(coarse["skin_max_mm"]) < 6 and float(coarse["error_mm"]) < 0.1
 
 
+@pytest.mark.quick
 def test_the_runs_are_counted_and_a_conclusion_is_drawn(folder):
     *lines, conclusion, _ = (folder / "said").read_text().splitlines()
     assert lines[0].split() == ["first", "the", "reference"]

@@ -135,6 +135,7 @@ def test_ordinary_options_of_petsc_do_no_harm(run, scenes, words):
     assert (result.returncode, result.stderr) == (0, ""), result
 
 
+@pytest.mark.quick
 def test_a_search_that_an_option_stops_short_names_it(run):
     result = run("repose-solve", PROJECT / "meshes/head_springs_advance.yaml", "-ksp_max_it", 1)
     assert result.returncode == 2 and "). Leave out -ksp_max_it 1 first" in result.stdout, result

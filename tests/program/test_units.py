@@ -12,6 +12,8 @@ from tissue import last, write_model
 sys.path.append(str(PROJECT / "tests/extremes"))
 from bodies import block, of_solid, of_springs  # noqa: E402
 
+pytestmark = pytest.mark.quick
+
 YOUNG = 0.03  # N/mm²
 VECTORS = ("point/position", "point/target")
 POWERS = {

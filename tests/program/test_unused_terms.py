@@ -10,6 +10,8 @@ import pytest
 
 from conftest import finish, programs
 
+pytestmark = pytest.mark.quick
+
 
 @pytest.fixture(scope="module")
 def instructions(tmp_path_factory, environment):

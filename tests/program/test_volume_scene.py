@@ -34,6 +34,7 @@ def write_volumes(folder):
     v.write_nifti(folder / "labels.nii.gz", np.where(radius < 15, halves, 0).astype("<i2"))
 
 
+@pytest.mark.quick
 def test_a_scene_of_volumes_is_solved(run, tmp_path):
     write_volumes(tmp_path)
     (tmp_path / "scene.yaml").write_text(SCENE)

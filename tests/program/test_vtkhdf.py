@@ -80,6 +80,7 @@ def test_what_moves_is_every_step_and_what_stays_is_the_models(opening):
             assert set(root[f"Steps/{place}Offsets"]) == set(root[place])
 
 
+@pytest.mark.quick
 def test_bones_have_their_motion_at_every_step(opening):
     """Finite, and that which the plan says: a screw about the jaw's hinge."""
     model = model_of(opening)
@@ -179,6 +180,7 @@ def read_back(file, environment):
         assert message.stdout.count(f"{len(steps(file))} load steps") == message.stdout.count("agree") > 0
 
 
+@pytest.mark.quick
 def test_other_programs_read_every_array_of_every_step(opening, environment):
     read_back(opening, environment)
 
