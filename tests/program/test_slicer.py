@@ -335,6 +335,14 @@ def test_a_damaged_model_in_ras_is_refused(program, tmp_path):
         program["link"](file, tmp_path, "skin")
 
 
+@pytest.mark.parametrize("name, head", [("face.STL", b"3D Slicer output. SPACE=RAS".ljust(84, b"\0")),
+                                        ("face.obj", b"# 3D Slicer output. SPACE=RAS\nv 0 0 0\n")])
+def test_a_model_in_ras_that_is_not_converted_is_refused(program, tmp_path, name, head):
+    (tmp_path / name).write_bytes(head)
+    with pytest.raises(program["Refusal"], match=f"{name}: in RAS, .*save it as LPS or as PLY"):
+        program["link"](tmp_path / name, tmp_path, "skin")
+
+
 @pytest.mark.quick
 def test_the_lips_are_the_scenes_mouth_and_a_cut_is_an_incision(panel, head, tmp_path):
     """The solver names what it refuses: so much of a scene that the panel writes is seen."""

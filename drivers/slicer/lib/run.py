@@ -124,6 +124,8 @@ def link(source, folder, name):
     target = folder / (name + ending)
     if ending.lower() == ".ply" and (turned := in_lps(source.read_bytes(), source)):
         target.write_bytes(turned)
+    elif ending.lower() in (".stl", ".obj", ".off") and b"SPACE=RAS" in source.read_bytes()[:1000]:
+        raise Refusal(f"{source}: in RAS, from which PLY files alone are converted; save it as LPS or as PLY")
     else:
         target.symlink_to(source.resolve())
     return target.name
@@ -435,11 +437,10 @@ def run():
 
 
 def main():
-    if "--xml" in sys.argv[1:]:
-        sys.stdout.write((FOLDER / "Repose.xml").read_text(encoding="utf-8"))
-        return 0
-    if HELP & set(sys.argv[1:]):
-        print(help_text())
+    if (HELP | {"--xml"}) & set(sys.argv[1:]):
+        signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # a reader that goes away ends it in silence
+        description = (FOLDER / "Repose.xml").read_text(encoding="utf-8")
+        print(description if "--xml" in sys.argv[1:] else help_text() + "\n", end="")
         return 0
     try:
         for number in SIGNALS:
