@@ -160,7 +160,7 @@ Base* PlanSession::State::base(const Placements& placements,
   with.abandoned = abandoned;
   Solved solved = search(placements, with, {});
   const solve::PathOutcome& path = solved.summary.path;
-  if (path.last.stopped) return nullptr;
+  if (path.last.stopped || solved.summary.abandoned) return nullptr;
   Base base{placements, std::move(solved.rows.position), {}, {}, {}};
   for (model::PointField& field : solved.rows.point_fields) {
     if (field.name == "contact_pressure") base.pressure = field.values;
@@ -271,7 +271,8 @@ PlanSession::Answer PlanSession::solve(const Request& request) {
   with.derivatives.functional = s.weights(request.functional);
   Solved solved = s.search(request.plan, with, start);
   answer.summary = solved.summary;
-  if (answer.summary.path.last.stopped) return answer;  // an abandoned plan is no answer
+  answer.abandoned = answer.summary.path.last.stopped || answer.summary.abandoned;
+  if (answer.abandoned) return answer;
   answer.from_base = answer.summary.path.leapt;
   answer.position = base::gather(s.comm, solved.rows.position);
   for (const model::PointField& field : solved.rows.point_fields) {

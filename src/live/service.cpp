@@ -279,7 +279,7 @@ void Service::solve(const Request& request, Reply& reply) {
   const double before = base::cpu_seconds();
   const PlanSession::Answer answer = session_->solve(requested);
   const solve::PathOutcome& path = answer.summary.path;
-  if (path.last.stopped) base::refuse("abandoned: a later request overtook it");
+  if (answer.abandoned) base::refuse("abandoned: a later request overtook it");
   json& head = reply.head();
   head["converged"] = path.complete();
   head["error"] = path.last.displacement_error;

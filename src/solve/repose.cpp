@@ -316,9 +316,14 @@ class Steps {
       rows.point_fields.push_back(
           natural_.field("other_rest_displacement", outcome.other->displacement));
     if (settings_.derivatives.requested() && load == 1 && outcome.converged)
-      summary_.gradient = differentiate(searcher_.problem(), natural_, displacement,
-                                        settings_.derivatives, rows.point_fields);
+      differentiate(displacement, rows.point_fields);
     receive_(last, rows);
+  }
+
+  void differentiate(Vec displacement, std::vector<model::PointField>& fields) {
+    summary_.gradient =
+        solve::differentiate(searcher_.problem(), natural_, displacement, settings_, fields);
+    summary_.abandoned = settings_.abandoned && settings_.abandoned();
   }
 
   /// [bodies] at the last step.

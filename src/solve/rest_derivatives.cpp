@@ -193,9 +193,10 @@ model::PointField tangent_field(HeldResponse& response, const discrete::Position
 }  // namespace
 
 std::optional<Gradient> differentiate(Problem& problem, const discrete::NaturalRows& natural,
-                                      Vec displacement, const Derivatives& requested,
+                                      Vec displacement, const Settings& settings,
                                       std::vector<model::PointField>& fields) {
   constexpr std::string_view axes = "xyz";
+  const Derivatives& requested = settings.derivatives;
   discrete::Objective& objective = problem.objective();
   discrete::Positions& positions = objective.positions();
   const base::VecHandle slope = positions.make_vector(), forces = positions.make_vector();
@@ -217,10 +218,12 @@ std::optional<Gradient> differentiate(Problem& problem, const discrete::NaturalR
                                        std::move(change.travel)));
     };
     for (const PlanPiece& piece : requested.pieces)
-      for (int c = 0; c < 6; ++c)
+      for (int c = 0; c < 6; ++c) {
+        if (settings.abandoned && settings.abandoned()) return {};
         add(fmt::format("tangent_{}_{}{}", piece.bone, c < 3 ? 't' : 'r', axes[c % 3]),
             c < 3 ? "mm/mm" : "mm/degree",
             differentiate_by(objective, displacement, piece, c, slope), &Gradient::by_pieces);
+      }
     positions.update(displacement);
     const StrataForces strata(objective, requested);
     const mechanics::BodyContact& bodies = objective.contact().bodies();

@@ -17,9 +17,9 @@ namespace repose::solve {
 /// which ∇Φ is linear, its forces. The gradient of a scalar Σ w · x is wᵀ ∂x/∂p by one solve,
 /// H λ = w. One preconditioner serves all right-hand sides. The flags `finished` and `convex` say
 /// whether a linear solve reached the tolerance and met no negative curvature; where either is
-/// false its result is 0. Collective.
+/// false its result is 0. Nothing where the settings' `abandoned` ends it. Collective.
 std::optional<Gradient> differentiate(Problem& problem, const discrete::NaturalRows& natural,
-                                      Vec displacement, const Derivatives& requested,
+                                      Vec displacement, const Settings& settings,
                                       std::vector<model::PointField>& fields);
 
 }  // namespace repose::solve

@@ -42,6 +42,7 @@ class PlanSession {
     solve::Summary summary;                ///< on all ranks
     std::vector<Vec3> position;            ///< [N] mm
     std::vector<model::PointField> field;  ///< [N] contact and tangents
+    bool abandoned = false;                ///< there is nothing else then
     bool from_base = false;                ///< the search began at the base and ended there
   };
 

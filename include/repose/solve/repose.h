@@ -75,7 +75,8 @@ struct Settings {
   bool stability = false;                ///< the smallest eigenvalue where the run ends, …
   bool initial_equilibrium = false;      ///< … and at its start, because the scene requests one
   Derivatives derivatives = {};          ///< of a rest position at load 1
-  /// Returns whether to end the search as if interrupted; called at each iteration, collective.
+  /// Returns whether to end the search as if interrupted; called at each iteration and before each
+  /// derivative, collective.
   std::function<bool()> abandoned = {};
   /// Called at each iteration, on all ranks.
   std::function<void(double load, const StateSnapshot&)> on_iterate;
@@ -128,6 +129,7 @@ struct Summary {
   int64_t assemblies = 0;                    ///< of the Hessian
   std::optional<Spectrum> initial_spectrum;  ///< at the start, where requested
   std::optional<Gradient> gradient;          ///< where requested, of a rest position at load 1
+  bool abandoned = false;                    ///< before all derivatives were found
   std::optional<Spectrum> final_spectrum;    ///< where the run ended, where requested
   std::vector<ContactSummary>
       contacts;            ///< a row a body of the model's contact, then the sides of cuts

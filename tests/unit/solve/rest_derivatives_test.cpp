@@ -1,5 +1,7 @@
 #include <gtest/gtest.h>
 
+#include <utility>
+
 #include "repose/model/material.h"
 #include "rest.h"
 #include "solid_block.h"
@@ -61,6 +63,24 @@ TEST(RestDerivatives, AreTheDifferencesOfRestPositions) {
     EXPECT_GT(largest, c < 3 ? 0.9 : 0.05);
     EXPECT_LT(error, 1e-3 * largest) << fields[c].name;
   }
+}
+
+TEST(RestDerivatives, EndWhereTheyAreAbandoned) {
+  const scene::Placement at{{0.5, -1, 0.3}, {4, -2, 6}};
+  int calls = 0;
+  solve::Settings settings = testing::settings(1e-8);
+  settings.abandoned = [&] { return ++calls < 0; };
+  testing::find_rest(carried(at), settings);
+  const int searching = std::exchange(calls, 0);
+  settings.derivatives.pieces = {{0, centroid, at}};
+  settings.abandoned = [&] { return ++calls > searching + 2; };
+  const testing::Rest rest = testing::find_rest(carried(at), settings);
+  EXPECT_TRUE(rest.summary.path.complete());
+  EXPECT_TRUE(rest.summary.abandoned);
+  const auto is_tangent = [](const model::PointField& field) {
+    return field.name.starts_with("tangent_");
+  };
+  EXPECT_EQ(std::ranges::count_if(rest.rows.point_fields, is_tangent), 2);
 }
 
 /// `carried` with a plate of the piece that presses on the upper face.
