@@ -2,6 +2,7 @@
 # of docs/develop/design.md is a target, too (Repose::surface), and brings those it builds on. On Debian the
 # packages that build Repose are needed.
 include(CMakeFindDependencyMacro)
+enable_language(C) # of MPI
 find_dependency(MPI COMPONENTS C)
 find_dependency(Eigen3 NO_MODULE)
 find_dependency(fmt)

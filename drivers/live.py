@@ -186,9 +186,8 @@ class Handler(http.server.BaseHTTPRequestHandler):
 
     def write(self, plan):
         """Writes the result of a plan. Returns its path without ending."""
-        name = self.server.scene.with_name(self.server.scene.stem + "_plan")
-        self.server.session.write(name, plan)
-        return name
+        self.server.session.write(self.server.output, plan)
+        return self.server.output
 
     def report(self, request):
         """Writes the result and its planning sheet."""
@@ -204,14 +203,15 @@ class Handler(http.server.BaseHTTPRequestHandler):
         pass
 
 
-def make_server(session, scene, port=0):
-    """A server of the page about a session of this scene, and its address."""
+def make_server(session, scene, port=0, output=None):
+    """A server of the page about a session of this scene, and its address. Results are called `output` and an ending."""
     try:
         server = http.server.ThreadingHTTPServer(("127.0.0.1", port), Handler)
     except OSError as reason:
         refuse(f"-port {port}: {reason.strerror}; choose another one, or 0 for a free one")
     server.daemon_threads = True
     server.session, server.scene, server.writing = session, scene.resolve(), threading.Lock()
+    server.output = (output or scene.with_name(scene.stem + "_plan")).resolve()
     server.angles = ProfileAngles(server.scene, session)
     server.token, server.page = secrets.token_urlsafe(18), page(server.scene)
     return server, f"http://127.0.0.1:{server.server_address[1]}/?token={server.token}"
@@ -222,6 +222,8 @@ def main():
     parser.add_argument("scene", type=pathlib.Path, help="scene (.yaml) with a plan")
     parser.add_argument("-ranks", type=number_from(1, 1024), default=1, help="processes of the solver")
     parser.add_argument("-port", type=number_from(0, 65535), default=0, help="port of 127.0.0.1; default: a free one")
+    parser.add_argument("-output", type=pathlib.Path, metavar="NAME", help="name of results and reports that the page "
+                        "writes, without ending; default: that of the scene with _plan, beside it")
     parser.add_argument("-no_browser", action="store_true", help="only print the address")
     options = parser.parse_args()
     if not options.scene.is_file():
@@ -233,7 +235,7 @@ def main():
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
     try:
         with repose.Session(options.scene, options.ranks, verify_every=VERIFY_EVERY) as session:
-            server, address = make_server(session, options.scene, options.port)
+            server, address = make_server(session, options.scene, options.port, options.output)
             print(f"{options.scene}: {address}\nCtrl-C ends it.", flush=True)
             if not options.no_browser:
                 webbrowser.open(address)

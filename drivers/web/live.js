@@ -321,6 +321,7 @@ class Planner {
       }
       const {head, arrays} = unpack(answer);
       if (head.converged) this.exact = {plan, position: arrays.position};
+      if (head.converged && isSame(plan, this.keptPlan)) this.keepFace(this.follow(arrays.position), true);
       if (tangents) this.takeTangents(plan, head, arrays);
       if (!current()) return;
       this.showFace(arrays.position);
@@ -367,13 +368,21 @@ class Planner {
     const position = hit.state === KEPT ? this.kept : hit.state === NOW ? this.position
       : this.initial;
     const shift = hit.at(position, 3).map((x, a) => x - hit.at(this.initial, 3)[a]);
-    return (hit.state === NOW && this.former ? "former plan: " : "") +
+    return (hit.state === NOW && this.former ? "former plan: "
+      : hit.state === KEPT && !this.keptExact ? "plan A, preview: " : "") +
       shiftInWords(alongHead(this.head.axes, shift));
   }
 
-  keep() {
-    this.kept = this.position.slice();
+  // The face is a preview until the exact one of its plan is there.
+  keepFace(position, exact) {
+    this.kept = position.slice();
+    this.keptExact = exact;
     this.skin.setPositions(KEPT, this.kept);
+  }
+
+  keep() {
+    this.keptPlan = copyOf(this.plan);
+    this.keepFace(this.position, isSame(this.exact?.plan, this.plan));
     this.bones.forEach(bone => {
       bone.setPositions(KEPT, bone.positions[NOW]);
       const piece = this.pieces.get(bone.name), mesh = bone.object(KEPT);

@@ -153,6 +153,7 @@ def test_refusals_name_the_place_and_the_session_goes_on(coarse):
         with pytest.raises(repose.Refused) as refusal:
             coarse.ask(request)
         assert "\n" not in str(refusal.value)
+    assert coarse.ask({"do": "describe", "id": 99})[0]["id"] != 99, "numbers are the session's own"
     assert coarse.solve(B).converged
 
 

@@ -121,6 +121,12 @@ unpack = buffer => {
   await planner.solve(true);
   type(-5);
   found.preview = seen();
+  planner.keep();
+  const kept = () => planner.describe({state: 2, at: () => [0, 0, 0]}).startsWith("plan A, preview: ");
+  found.kept = [kept()];
+  await exact();
+  found.kept.push(kept(), planner.kept.every((x, i) => x === planner.position[i]));
+  await planner.solve(true);
   planner.reference.columns.delete("chin ty");
   type(-4);
   found.missing = seen();
@@ -286,18 +292,18 @@ def test_a_saved_scene_is_the_plan(live, served, run, tmp_path):
     assert run("repose-solve", scene, "-dry_run").returncode == 0
 
 
-def test_a_report_of_the_plan_is_written_beside_the_scene(served, tmp_path):
+def test_a_report_of_the_plan_is_written_where_it_is_wanted(served, tmp_path):
     server, address = served
-    own, server.scene = server.scene, tmp_path / SCENE.name
-    server.scene.write_text(own.read_text())
+    own, server.output = server.output, tmp_path / "plan"
+    assert own == server.scene.with_name("head_live_plan"), "beside the scene"
     try:
         code, path = status(address, "/report", {"X-Token": server.token},
                             json.dumps({"plan": {"chin": {"translate": [0, -2, 0]}}}).encode())
     finally:
-        server.scene = own
-    assert code == 200 and path.decode() == str(tmp_path / "head_live_plan.html"), path
-    text = (tmp_path / "head_live_plan.html").read_text()
-    assert "chin" in text and "<svg" in text and (tmp_path / "head_live_plan.h5").is_file()
+        server.output = own
+    assert code == 200 and path.decode() == str(tmp_path / "plan.html"), path
+    text = (tmp_path / "plan.html").read_text()
+    assert "chin" in text and "<svg" in text and (tmp_path / "plan.h5").is_file()
 
 
 def browsed(live, served, script, size):
@@ -328,6 +334,7 @@ def test_a_face_of_the_former_plan_is_marked_as_such(live, served):
     assert found["stays"]
     for own in (undone, preview):
         assert own["kind"] == "preview" and own["which"] == "now" and own["off"] == [False, False]
+    assert found["kept"] == [True, False, True], "a preview that is kept becomes exact"
     assert undone["measured"] == first["measured"] and found["then"]["kind"] == "exact"
 
 

@@ -350,7 +350,7 @@ class Session:
             self._last += 1
             number = self._last
             try:
-                line = json.dumps({"id": number, **request}, allow_nan=False)
+                line = json.dumps({**request, "id": number}, allow_nan=False)
             except ValueError as reason:
                 raise Refused(f"the request is no JSON, which has finite numbers only: {reason}") from None
             self._waiting[number] = waiting
