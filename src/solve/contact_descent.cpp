@@ -32,16 +32,18 @@ void ContactDescent::stiffen(int times) {
   penalty_.set_stiffness(stiffness_);
 }
 
-/// Searches with a softer penalty, which lets points change sides a few at a time, and takes the
-/// pressures there as multipliers, at the full stiffness again.
-Outcome ContactDescent::presolve(Vec displacement, double accuracy) {
+/// Softens the penalty, which lets points change sides a few at a time.
+void ContactDescent::soften() {
   constexpr double softened = 0.25;
   penalty_.set_stiffness(softened * stiffness_);
-  const Outcome outcome = minimizer_.presolve(displacement, accuracy);
+}
+
+/// Takes the pressures of a soft search that ended at `displacement` as multipliers, at the full
+/// stiffness again.
+void ContactDescent::harden(Vec displacement) {
   objective_.positions().update(displacement);
   penalty_.move_multipliers();
   penalty_.set_stiffness(stiffness_);
-  return outcome;
 }
 
 void ContactDescent::slacken(Vec displacement) {
@@ -56,7 +58,9 @@ ContactDescent::End ContactDescent::approach(Vec displacement, double accuracy,
                                              int64_t& iterations) {
   constexpr double roughly = 0.1, finely = 0.004;  // mm
   objective_.contact().round_bodies(true);
-  const Outcome near = presolve(displacement, std::max(roughly, accuracy));
+  soften();
+  const Outcome near = minimizer_.presolve(displacement, std::max(roughly, accuracy));
+  harden(displacement);
   iterations += near.iterations;
   const End end = near.stopped ? End::stopped : programs_.run(displacement, finely, iterations);
   objective_.contact().round_bodies(false);
@@ -141,7 +145,9 @@ Outcome ContactDescent::settle(Vec displacement, double accuracy, int max_rounds
   stiffen(times);
   for (int round = 0; round < max_rounds;) {
     if (needs_presolve) {
-      const Outcome near = presolve(displacement, accuracy);
+      soften();
+      const Outcome near = minimizer_.presolve(displacement, accuracy);
+      harden(displacement);
       iterations += near.iterations;
       if (near.stopped) return stopped(displacement, outcome);
     }

@@ -33,9 +33,10 @@ class ContactDescent {
   Outcome stopped(Vec displacement, Outcome outcome = {});
 
  private:
-  Outcome presolve(Vec displacement, double accuracy);
   bool release_overlapped(double accuracy);
   bool lead_out(Vec displacement, double accuracy);
+  void soften();
+  void harden(Vec displacement);
 
   discrete::Objective& objective_;
   discrete::Tangent& tangent_;
