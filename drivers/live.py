@@ -25,6 +25,7 @@ HERE = pathlib.Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE / "python"), str(HERE)]
 from sheet.scene import named_file, with_moves  # noqa: E402
 from sheet.script import Arguments, Unusable, number_from, refuse, refuse_missing, run  # noqa: E402
+from sheet.summary import cautions, sentence  # noqa: E402
 from sheet.web_page import read_web, web_page  # noqa: E402
 
 LONGEST_REQUEST = 1 << 20
@@ -182,22 +183,26 @@ class Handler(http.server.BaseHTTPRequestHandler):
 
     def result(self, request):
         with self.server.writing:
-            return f"{self.write(request['plan'])}.h5".encode()
+            return self.written(".h5", self.write(request["plan"]))
 
     def write(self, plan):
-        """Writes the result of a plan. Returns its path without ending."""
-        self.server.session.write(self.server.output, plan)
-        return self.server.output
+        """Writes the result of a plan. Returns the lines of its summary."""
+        return self.server.session.write(self.server.output, plan).splitlines()
+
+    def written(self, ending, lines):
+        """What was written, and a line for each warning of its summary."""
+        told = [sentence(name, line[25:]) for line in lines for name, *_ in cautions([line])]
+        return "\n".join([f"{self.server.output}{ending}", *told]).encode()
 
     def report(self, request):
         """Writes the result and its planning sheet."""
         with self.server.writing:
-            name = self.write(request["plan"])
+            name, lines = self.server.output, self.write(request["plan"])
             done = subprocess.run([sys.executable, HERE / "report.py", name, "-output", f"{name}.html", "-scene",
                                    self.server.scene], capture_output=True, text=True)
         if done.returncode != 0:
             raise ValueError(done.stderr.strip().splitlines()[-1] if done.stderr.strip() else "report.py failed")
-        return f"{name}.html".encode()
+        return self.written(".html", lines)
 
     def log_message(self, *_):
         pass

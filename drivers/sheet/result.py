@@ -1,19 +1,13 @@
 """A result file as the planning sheet reads it: the skin to show, bones, and the steps' numbers."""
 
 import math
-import re
 
 import h5py
 import numpy as np
 
 from sheet.script import Unusable, reading
 from sheet.shown_skin import matching_rows, opened, read_given, read_places, read_rows, solved_skin
-
-# Rows of the summary of repose-solve that the page repeats, and words that only those have that warn
-CAUTIONS = {"warning": "", "other rest position": "", "pierced by bone": "", "pierced by instrument": "",
-            "skin on bone": "", "exact penetration": "points are deeper", "bone through skin": "",
-            "border of the skin": "", "self-contact": "", "path": "DEPENDS"}
-PLACE = re.compile(r"(?:at|about) \((\S+), (\S+), (\S+)\)(?: mm)?")
+from sheet.summary import cautions
 
 
 class Figure(str):
@@ -90,17 +84,10 @@ class Result:
                                "motion": rigid(points, after)})
 
     def read_summary(self, h5):
-        """Warnings of the summary of repose-solve: [(name of the row, text before a place, place or None, text
-        after it)]."""
-        self.cautions = []
-        for line in map(text, h5["summary"][()]) if "summary" in h5 else ():
-            name, told = line[:24].strip(), line[25:]
-            if name not in CAUTIONS or CAUTIONS[name] not in told:
-                continue
-            found = PLACE.search(told)
-            place = np.array([float(number) for number in found.groups()]) if found else None
-            before, after = (told[:found.start()], told[found.end():]) if found else (told, "")
-            self.cautions.append((name, before, place, after))
+        """Warnings of the summary of repose-solve, as of `cautions` with places as arrays."""
+        lines = map(text, h5["summary"][()]) if "summary" in h5 else ()
+        self.cautions = [(name, before, None if place is None else np.array(place), after)
+                         for name, before, place, after in cautions(lines)]
 
     def turn(self, axes):
         """Takes all places to axes that are given as rows."""

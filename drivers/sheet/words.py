@@ -7,6 +7,7 @@ import re
 import numpy as np
 
 from sheet.landmarks import Parts, place_in_words
+from sheet.summary import sentence
 
 LARGE_VOLUME, LARGE_ERROR = 0.2, 0.5  # relative, mm: beyond, the page warns
 PUBLISHED = (
@@ -83,9 +84,7 @@ def summary_cautions(result, known, parts):
     """Warnings of the summary of repose-solve."""
     for name, before, place, after in result.cautions:
         where = "" if place is None else place_in_words(place, known, parts)
-        told = f"{before}{where}{after}".replace("THE REST POSITION", "the rest position")
-        line = told if name == "warning" else f"{name}: {told}"
-        yield f"{line[0].upper()}{line[1:]}."
+        yield sentence(name, f"{before}{where}{after}")
 
 
 def mesh_caution(result, parts):

@@ -301,7 +301,7 @@ def test_a_report_of_the_plan_is_written_where_it_is_wanted(served, tmp_path):
                             json.dumps({"plan": {"chin": {"translate": [0, -2, 0]}}}).encode())
     finally:
         server.output = own
-    assert code == 200 and path.decode() == str(tmp_path / "plan.html"), path
+    assert code == 200 and path.decode().splitlines()[0] == str(tmp_path / "plan.html"), path
     text = (tmp_path / "plan.html").read_text()
     assert "chin" in text and "<svg" in text and (tmp_path / "plan.h5").is_file()
 
@@ -320,6 +320,14 @@ def browsed(live, served, script, size):
     found = json.loads(FOUND.search(message)[1].replace("&amp;", "&"))
     assert "error" not in found, found
     return found
+
+
+def test_a_written_result_warns_of_what_its_summary_warns_of(served, monkeypatch):
+    server, address = served
+    told = "SKIN PASSES THROUGH SKIN: 2 of its triangles, one at (1, 2, 3) mm"
+    monkeypatch.setattr(server.session, "write", lambda *_: f"{'accuracy':24} 0.1 mm\n{'self-contact':24} {told}\n")
+    code, lines = status(address, "/result", {"X-Token": server.token}, b'{"plan": {}}')
+    assert (code, lines.decode().splitlines()) == (200, [f"{server.output}.h5", f"Self-contact: {told}."])
 
 
 def test_a_face_of_the_former_plan_is_marked_as_such(live, served):
