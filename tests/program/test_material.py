@@ -264,7 +264,7 @@ def test_mesh_and_layers_have_an_estimate_of_their_own(run, tmp_path):
                  marks=pytest.mark.long),
     ("", 20, "mm from the continuum at most", False),
     ("  edge: 9\n  depths: [0, 0.3, 0.6, 1]", 0.01, "the scene fixes its layers", False),
-    pytest.param("  edge: 9", 1.5, "mm from the continuum at most", True, marks=pytest.mark.long)])
+    ("  edge: 9", 3, "mm from the continuum at most", True)])
 def test_adapt_goes_towards_the_continuum_or_says_why_not(run, tmp_path, edge, accuracy, report, more):
     text = scene(edge, JAW_OPENS, head="paper")
     own = solve(run, tmp_path, "own", text, "-accuracy", 1)[0]
