@@ -8,6 +8,7 @@ import subprocess
 import typing
 
 import numpy as np
+from scipy.sparse import diags
 from scipy.sparse.linalg import ArpackError, eigsh
 
 from conftest import finish, programs
@@ -56,10 +57,30 @@ def volume_weight(step):
     return None
 
 
+class SupportedSolid(Solid):
+    """A solid with elastic supports, the one term with elements of heads without anatomy, at load 1."""
+
+    def __init__(self, model):
+        super().__init__(model)
+        numbers = model.get("element/0/numbers", np.empty(0)).reshape(-1, 5)
+        self.place, self.support = np.zeros_like(self.rest), np.zeros((len(self.rest), 1))
+        for point, (*start, stiffness, bone) in zip(model.get("element/0/points", ()), numbers):
+            self.place[point] = (model["bone_transform"][int(bone)] @ (*start, 1))[:3]
+            self.support[point] = stiffness
+
+    def value_and_gradient(self, x):
+        value, gradient = super().value_and_gradient(x)
+        force = self.support * (x - self.place)
+        return value + (force * (x - self.place)).sum() / 2, gradient + force
+
+    def hessian(self, x, curved=True):
+        return super().hessian(x, curved) + diags(np.repeat(self.support, 3))
+
+
 def tissue_of(model, step, exact=False):
     """The independent energy of a model as a step minimized it."""
     if "edge/points" in model:
-        return Solid(model)
+        return SupportedSolid(model)
     return Network(model, volume_weight(step), np.longdouble if exact else float)
 
 
