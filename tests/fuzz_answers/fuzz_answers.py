@@ -180,7 +180,7 @@ def parse():
 def main():
     options = parse()
     begin = options.first if options.only is None else options.only
-    end = options.count if options.only is None else options.only + 1
+    end = begin + (options.count if options.only is None else 1)
     scenes, every, left, needed = plan(options.seed, end)
     print(f"{every - left} of {every} pairs of features in {end} scenes"
           + (f", all in the first {needed}" if needed else ""), flush=True)
