@@ -191,8 +191,7 @@ class Handler(http.server.BaseHTTPRequestHandler):
 
     def written(self, ending, lines):
         """What was written, and a line for each warning of its summary."""
-        told = [sentence(name, line[25:]) for line in lines for name, *_ in cautions([line])]
-        return "\n".join([f"{self.server.output}{ending}", *told]).encode()
+        return "\n".join([f"{self.server.output}{ending}", *(sentence(*one) for one in cautions(lines))]).encode()
 
     def report(self, request):
         """Writes the result and its planning sheet."""

@@ -7,7 +7,7 @@ import numpy as np
 
 from sheet.script import Unusable, reading
 from sheet.shown_skin import matching_rows, opened, read_given, read_places, read_rows, solved_skin
-from sheet.summary import cautions
+from sheet.summary import cautions, parted
 
 
 class Figure(str):
@@ -84,10 +84,12 @@ class Result:
                                "motion": rigid(points, after)})
 
     def read_summary(self, h5):
-        """Warnings of the summary of repose-solve, as of `cautions` with places as arrays."""
-        lines = map(text, h5["summary"][()]) if "summary" in h5 else ()
-        self.cautions = [(name, before, None if place is None else np.array(place), after)
-                         for name, before, place, after in cautions(lines)]
+        """Warnings of the summary of repose-solve: [(name of the row, text before a place, place or None, text
+        after it)]."""
+        self.cautions = []
+        for name, told in cautions(map(text, h5["summary"][()]) if "summary" in h5 else ()):
+            before, place, after = parted(told)
+            self.cautions.append((name, before, None if place is None else np.array(place), after))
 
     def turn(self, axes):
         """Takes all places to axes that are given as rows."""

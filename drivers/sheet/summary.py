@@ -10,17 +10,19 @@ PLACE = re.compile(r"(?:at|about) \((\S+), (\S+), (\S+)\)(?: mm)?")
 
 
 def cautions(lines):
-    """Those of the lines of a summary: [(name of the row, text before a place, place or None, text after it)],
-    mm."""
-    found = []
+    """Those of the lines of a summary: (name of the row, text)."""
     for line in lines:
         name, told = line[:24].strip(), line[25:]
-        if name not in CAUTIONS or CAUTIONS[name] not in told:
-            continue
-        place = PLACE.search(told)
-        before, after = (told[:place.start()], told[place.end():]) if place else (told, "")
-        found.append((name, before, [float(number) for number in place.groups()] if place else None, after))
-    return found
+        if name in CAUTIONS and CAUTIONS[name] in told:
+            yield name, told
+
+
+def parted(told):
+    """The text of a caution as text before a place, place or None, mm, and text after it."""
+    place = PLACE.search(told)
+    if not place:
+        return told, None, ""
+    return told[:place.start()], [float(number) for number in place.groups()], told[place.end():]
 
 
 def sentence(name, told):

@@ -320,16 +320,16 @@ class Steps {
     receive_(last, rows);
   }
 
+  /// [bodies] at the last step.
+  const std::vector<PenetrationDepth>& depths() const { return depths_; }
+
+ private:
   void differentiate(Vec displacement, std::vector<model::PointField>& fields) {
     summary_.gradient =
         solve::differentiate(searcher_.problem(), natural_, displacement, settings_, fields);
     summary_.abandoned = settings_.abandoned && settings_.abandoned();
   }
 
-  /// [bodies] at the last step.
-  const std::vector<PenetrationDepth>& depths() const { return depths_; }
-
- private:
   Searcher& searcher_;
   const Settings& settings_;
   const discrete::NaturalRows& natural_;

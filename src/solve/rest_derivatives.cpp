@@ -200,6 +200,7 @@ std::optional<Gradient> differentiate(Problem& problem, const discrete::NaturalR
   discrete::Objective& objective = problem.objective();
   discrete::Positions& positions = objective.positions();
   const base::VecHandle slope = positions.make_vector(), forces = positions.make_vector();
+  const auto abandoned = [&] { return settings.abandoned && settings.abandoned(); };
   std::optional<Adjoint> adjoint;
   positions.update(displacement);
   objective.contact().place_bodies();
@@ -219,7 +220,7 @@ std::optional<Gradient> differentiate(Problem& problem, const discrete::NaturalR
     };
     for (const PlanPiece& piece : requested.pieces)
       for (int c = 0; c < 6; ++c) {
-        if (settings.abandoned && settings.abandoned()) return {};
+        if (abandoned()) return {};
         add(fmt::format("tangent_{}_{}{}", piece.bone, c < 3 ? 't' : 'r', axes[c % 3]),
             c < 3 ? "mm/mm" : "mm/degree",
             differentiate_by(objective, displacement, piece, c, slope), &Gradient::by_pieces);
@@ -231,6 +232,7 @@ std::optional<Gradient> differentiate(Problem& problem, const discrete::NaturalR
                            std::vector<double>(bodies.gaps().size(), 0.0),
                            std::vector<double>(objective.contact().cut_faces().size(), 0.0)};
     for (size_t s = 0; s < requested.strata.size(); ++s) {
+      if (abandoned()) return {};
       strata.assemble(s, slope);
       add(fmt::format("tangent_young_{}", s), "mm", unchanged, &Gradient::by_strata);
     }
