@@ -5,16 +5,16 @@
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 case "${1-}" in
-  "") left_out="more|long" && export REPOSE_FEW=1 ;;
-  --more) left_out="long" ;;
-  --all) left_out="" && export REPOSE_ALL=1 ;;
+  "") left_out="more|long" target=quick && export REPOSE_FEW=1 ;;
+  --more) left_out="long" target=all ;;
+  --all) left_out="" target=all && export REPOSE_ALL=1 ;;
   *) echo "run.sh: $1: the only arguments are --more and --all" >&2 && exit 1 ;;
 esac
 . drivers/setup.sh
 
 install_packages "${build_packages[@]}" "${test_packages[@]}"
 cmake --preset ci
-cmake --build --preset ci
+cmake --build --preset ci --target "$target"
 
 if command -v clang-format-14 >/dev/null; then
   find drivers examples include src tests \( -name '*.h' -o -name '*.cpp' \) -print0 |
