@@ -340,7 +340,7 @@ void check_sizes(const surface::Surface& predicted, const surface::Surface& actu
 
 void run(const base::Options& options) {
   require_landmarks(options);
-  base::require_writable(options.text("output") + ".vtp");
+  for (const char* ending : {".vtp", ".csv"}) base::reserve_output(options.text("output") + ending);
   surface::Surface predicted = read_facing_outward(options.arguments()[0]);
   surface::Surface actual = read_facing_outward(options.arguments()[1]);
   check_sizes(predicted, actual, options.arguments());

@@ -105,7 +105,7 @@ void print_landmarks(const anatomy::Proposal& proposal, const anatomy::Proposal&
 
 base::Exit run(const base::Options& options) {
   const std::string name = options.text("output");
-  base::reserve_output(name + ".mrk.json");
+  for (const char* ending : {".mrk.json", ".svg"}) base::reserve_output(name + ending);
   const surface::Surface skull = read(options, "skull"), mandible = read(options, "mandible"),
                          skin = surface::read_surface(options.arguments()[0]);
   scene::Landmarks given;

@@ -84,7 +84,23 @@ struct Parts {
   std::vector<surface::Surface> surfaces;
   std::vector<std::string> names, remarks;
   std::vector<scene::RigidMotion> moves;  ///< of each surface, or none
+
+  bool is_moved(size_t part) const { return !moves.empty() && !moves[part].is_identity(); }
 };
+
+/// Returns the path of a part's file.
+std::string file_of(const base::Options& options, const std::string& part) {
+  const std::string stem = std::filesystem::path(options.arguments()[0]).stem().string();
+  return fmt::format("{}_{}.ply", options.has("output") ? options.text("output") : stem, part);
+}
+
+/// Refuses files that cannot be written, before the bones are read.
+void reserve_outputs(const base::Options& options, const Parts& parts) {
+  for (size_t k = 0; k < parts.names.size(); ++k) {
+    base::reserve_output(file_of(options, parts.names[k]));
+    if (parts.is_moved(k)) base::reserve_output(file_of(options, parts.names[k] + "_moved"));
+  }
+}
 
 Parts parts_of_scene(const base::Options& options, const std::filesystem::path& input) {
   for (const char* name : {"point", "normal", "radius", "surface", "kerf", "seed", "piece"})
@@ -94,12 +110,14 @@ Parts parts_of_scene(const base::Options& options, const std::filesystem::path& 
   const bool moved = options.flag("moved");
   if (scene.osteotomies.empty() && !moved)
     base::refuse("{}: has no osteotomies to make", input.string());
-  model::Bones bones = model::read_bones(scene);
-  Parts parts{std::move(bones.surfaces), {}, std::move(bones.remarks), {}};
-  for (const auto& lines : {scene.remarks, bones.warnings, scene.warnings})
-    parts.remarks.insert(parts.remarks.end(), lines.begin(), lines.end());
+  Parts parts;
   if (moved) parts.moves = scene.moves;
   for (const scene::BoneEntry& bone : scene.bones) parts.names.push_back(bone.name);
+  reserve_outputs(options, parts);
+  model::Bones bones = model::read_bones(scene);
+  parts.surfaces = std::move(bones.surfaces);
+  for (const auto& lines : {bones.remarks, scene.remarks, bones.warnings, scene.warnings})
+    parts.remarks.insert(parts.remarks.end(), lines.begin(), lines.end());
   return parts;
 }
 
@@ -111,12 +129,16 @@ Parts parts_of_bone(const base::Options& options, const std::filesystem::path& i
         "-piece {} must be 1 to 64 printable ASCII characters without '/', and not rest, the name "
         "of the bone's other part",
         base::quote(piece));
+  Parts parts{{}, {"rest", piece}, {}, {}};
+  reserve_outputs(options, parts);
   const meshtools::Osteotomy plan = plan_of(options);
-  meshtools::Pieces pieces =
+  const meshtools::Pieces pieces =
       meshtools::cut_bone(surface::load_surface(input, surface::Role::bone), plan);
-  std::vector<std::string> remarks = pieces.remarks;
-  if (plan.kerf > 0) remarks.push_back(fmt::format("the saw takes {:.1f} mm³", pieces.kerf_volume));
-  return {{pieces.rest, pieces.piece}, {"rest", plan.piece}, remarks, {}};
+  parts.surfaces = {pieces.rest, pieces.piece};
+  parts.remarks = pieces.remarks;
+  if (plan.kerf > 0)
+    parts.remarks.push_back(fmt::format("the saw takes {:.1f} mm³", pieces.kerf_volume));
+  return parts;
 }
 
 void write(const std::string& file, const surface::Surface& surface) {
@@ -127,23 +149,20 @@ void write(const std::string& file, const surface::Surface& surface) {
 
 void write_moved(const std::string& file, surface::Surface surface,
                  const scene::RigidMotion& motion) {
-  if (motion.is_identity()) return;
   for (Vec3& point : surface.points) point = motion.apply(point);
   write(file, surface);
 }
 
 void cut(const base::Options& options) {
   const std::filesystem::path input = options.arguments()[0];
-  if (options.has("output")) base::require_writable(options.text("output") + ".ply");
   const std::string ending = base::lower(input.extension().string());
   const bool is_scene = ending == ".yaml" || ending == ".yml";
   const Parts parts = is_scene ? parts_of_scene(options, input) : parts_of_bone(options, input);
-  const std::string name = options.has("output") ? options.text("output") : input.stem().string();
   for (const std::string& remark : parts.remarks) std::printf("  %s\n", remark.c_str());
   for (size_t k = 0; k < parts.surfaces.size(); ++k) {
-    const std::string file = fmt::format("{}_{}", name, parts.names[k]);
-    write(file + ".ply", parts.surfaces[k]);
-    if (!parts.moves.empty()) write_moved(file + "_moved.ply", parts.surfaces[k], parts.moves[k]);
+    write(file_of(options, parts.names[k]), parts.surfaces[k]);
+    if (parts.is_moved(k))
+      write_moved(file_of(options, parts.names[k] + "_moved"), parts.surfaces[k], parts.moves[k]);
   }
 }
 

@@ -42,7 +42,8 @@ void write_head(const base::Options& options) {
   tools::phantom::PhantomOptions requested;
   requested.skin_vertices = options.integer("skin_vertices");
   if (options.text("bone_edge") != "auto") requested.bone_edge = options.number("bone_edge");
-  base::require_writable(options.text("output") + ".yaml");
+  for (const auto& file : tools::phantom::phantom_files(options.text("output")))
+    base::require_writable(file);
   std::printf("  writes %s*: meshes, landmarks and scenes of a synthetic head (-help)\n",
               options.text("output").c_str());
   std::fflush(stdout);

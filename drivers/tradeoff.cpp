@@ -131,7 +131,10 @@ base::Exit run(const base::Options& options) {
   base::collective_try(comm, [&] { plan.scene = scene::read_scene(input); });
   const std::string name =
       options.has("output") ? options.text("output") : input.stem().string() + "_tradeoff";
-  base::on_root(comm, [&] { base::require_writable(name + ".csv"); });
+  base::on_root(comm, [&] {
+    for (const char* ending : {".csv", "_map.csv", "_triangles.csv"})
+      base::require_writable(name + ending);
+  });
   const auto tell = [](const std::string& line, size_t number, size_t runs) {
     const std::string counter = fmt::format("{:>3} of {}", number, runs);
     if (base::rank(comm) == 0)

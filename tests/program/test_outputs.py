@@ -14,6 +14,7 @@ tissue: {layers: 2}
 moves: [{bone: mandible, transform: move.h5}]
 """
 HEAD = ["skin.ply", "-skull", "skull.ply", "-mandible", "mandible.ply"]
+PLANE = ["-point", "0", "0", "0", "-normal", "0", "0", "1"]
 
 
 def write_transform(file):
@@ -34,7 +35,9 @@ def inputs(tmp_path):
     shutil.copy(MESHES / "head_mandible.ply", tmp_path / "files/jaw.ply")
     (tmp_path / "mandible.ply").symlink_to("files/jaw.ply")
     (tmp_path / "scene.yaml").write_text(SCENE)
+    shutil.copy(MESHES / "head_skull.ply", tmp_path / "head_skull.ply")
     shutil.copy(MESHES / "head.mrk.json", tmp_path / "known.mrk.json")
+    (tmp_path / "known.csv").write_text("subnasale,0,-90,0\n")
     write_transform(tmp_path / "move.h5")
     return {file: file.read_bytes() for file in tmp_path.rglob("*") if file.is_file()}
 
@@ -46,20 +49,21 @@ def inputs(tmp_path):
     ("repose-decimate", ["skin.ply", "-triangles", "1000", "-output", "skin.ply"], "skin.ply"),
     ("repose-decimate", ["mandible.ply", "-triangles", "500", "-output", "files/jaw.ply"], "files/jaw.ply"),
     ("repose-landmarks", [*HEAD, "-landmarks", "known.mrk.json", "-output", "known"], "known.mrk.json"),
+    ("repose-compare", ["skin.ply", "skin.ply", "-landmarks", "known.csv", "-output", "known"], "known.csv"),
+    ("repose-osteotomy", ["head_skull.ply", *PLANE, "-piece", "skull", "-output", "head"], "head_skull.ply"),
     ("repose-register", ["skin.ply", "skin.ply", "-landmarks", "known.mrk.json", "known.mrk.json", "-output", "skin"],
      "skin.ply")])
-def test_an_input_is_not_replaced(run, inputs, program, arguments, file):
+def test_an_input_is_not_replaced(run, inputs, tmp_path, program, arguments, file):
     result = run(program, *arguments)
     assert result.returncode == 1 and result.stderr.count("\n") == 1, result
     assert f"{file}: is an input of this run and would be replaced; choose another -output" in result.stderr
-    assert all(path.read_bytes() == content for path, content in inputs.items())
+    assert {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()} == inputs
     assert program == "repose-solve" or not result.stdout, "refused before the work"
 
 
 @pytest.mark.parametrize("program, arguments, name, files", [
     ("repose-solve", ["scene.yaml"], "r.h5", {"r.h5", "r_skin.xdmf"}),
-    ("repose-osteotomy", ["skull.ply", "-point", "0", "0", "0", "-normal", "0", "0", "1"], "r.PLY",
-     {"r_piece.ply", "r_rest.ply"}),
+    ("repose-osteotomy", ["skull.ply", *PLANE], "r.PLY", {"r_piece.ply", "r_rest.ply"}),
     ("repose-compare", ["skin.ply", "skin.ply"], "r.csv", {"r.vtp", "r.csv"}),
     ("repose-register", ["skin.ply", "skin.ply", "-landmarks", "known.mrk.json", "known.mrk.json"], "r.tfm",
      {"r.tfm", "r.ply"}),
@@ -75,13 +79,24 @@ def test_the_ending_of_a_result_is_not_doubled(run, inputs, tmp_path, program, a
 @pytest.mark.parametrize("program, arguments", [
     ("repose-compare", ["skin.ply", "skin.ply"]), ("repose-decimate", ["skin.ply", "-triangles", "1000"]),
     ("repose-isosurface", ["none.mhd", "-otsu"]), ("repose-landmarks", HEAD), ("repose-phantom", ["-skin_vertices", "477"]),
-    ("repose-osteotomy", ["skull.ply", "-point", "0", "0", "0", "-normal", "0", "0", "1"]),
+    ("repose-osteotomy", ["skull.ply", *PLANE]),
     ("repose-register", ["skin.ply", "skin.ply", "-landmarks", "known.mrk.json", "known.mrk.json"]),
     ("repose-scan", ["none.ply"]), ("repose-tradeoff", ["scene.yaml"])])
 def test_a_missing_folder_is_refused_before_the_work(run, inputs, program, arguments):
     result = run(program, *arguments, "-output", "none/r.ply")
     assert (result.returncode, result.stdout) == (1, "") and result.stderr.count("\n") == 1, result
     assert "cannot be written: there is no folder none; make it or choose another -output" in result.stderr
+
+
+@pytest.mark.parametrize("program, arguments, name", [
+    ("repose-compare", ["skin.ply", "skin.ply"], "r.csv"), ("repose-landmarks", HEAD, "r.svg"),
+    ("repose-phantom", ["-skin_vertices", "477"], "r_jaw_advance.yaml"),
+    ("repose-osteotomy", ["skull.ply", *PLANE], "r_piece.ply"), ("repose-tradeoff", ["scene.yaml"], "r_map.csv")])
+def test_a_folder_in_place_of_any_file_is_refused_before_the_work(run, inputs, tmp_path, program, arguments, name):
+    (tmp_path / name).mkdir()
+    result = run(program, *arguments, "-output", "r")
+    assert (result.returncode, result.stdout) == (1, "") and result.stderr.count("\n") == 1, result
+    assert f"{name}: is a folder; remove it or choose another -output" in result.stderr
 
 
 def test_a_file_in_place_of_the_folder_of_a_page_is_refused(run, inputs):

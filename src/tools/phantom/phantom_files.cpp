@@ -79,23 +79,28 @@ std::string scene_yaml(const SceneText& scene, const TissueText& tissue, std::st
 
 }  // namespace
 
+std::vector<std::filesystem::path> phantom_files(const std::filesystem::path& prefix) {
+  std::vector<std::filesystem::path> files;
+  for (const char* ending : {"_skin.ply", "_skull.ply", "_mandible.ply", "_landmarks.json",
+                             ".mrk.json", "_jaw_opening.yaml", "_jaw_advance.yaml"})
+    files.push_back(prefix.string() + ending);
+  return files;
+}
+
 std::vector<std::filesystem::path> write_phantom(const std::filesystem::path& prefix,
                                                  const Phantom& phantom, PhantomTissue kind) {
   const TissueText& tissue = kind == PhantomTissue::springs ? springs : solid;
-  std::vector<std::filesystem::path> written;
-  const auto named = [&](std::string_view ending) {
-    return written.emplace_back(prefix.string() + std::string(ending));
-  };
-  write_ply(named("_skin.ply"), phantom.skin);
-  write_ply(named("_skull.ply"), phantom.skull);
-  write_ply(named("_mandible.ply"), phantom.mandible);
+  const std::vector<std::filesystem::path> files = phantom_files(prefix);
+  write_ply(files[0], phantom.skin);
+  write_ply(files[1], phantom.skull);
+  write_ply(files[2], phantom.mandible);
   const Landmarks landmarks = rounded(phantom.landmarks);
-  base::write_whole_file(named("_landmarks.json"), landmarks_json(landmarks));
-  base::write_whole_file(named(".mrk.json"), scene::markups_text(landmarks));
+  base::write_whole_file(files[3], landmarks_json(landmarks));
+  base::write_whole_file(files[4], scene::markups_text(landmarks));
   const std::string stem = prefix.filename().string();
-  base::write_whole_file(named("_jaw_opening.yaml"), scene_yaml(opening, tissue, stem));
-  base::write_whole_file(named("_jaw_advance.yaml"), scene_yaml(advance, tissue, stem));
-  return written;
+  base::write_whole_file(files[5], scene_yaml(opening, tissue, stem));
+  base::write_whole_file(files[6], scene_yaml(advance, tissue, stem));
+  return files;
 }
 
 }  // namespace repose::tools::phantom

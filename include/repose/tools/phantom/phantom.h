@@ -50,9 +50,13 @@ Phantom make_phantom(const PhantomOptions& options);
 /// Tissue of the scenes: the solid with literature moduli, or the springs of the paper.
 enum class PhantomTissue { solid, springs };
 
-/// Writes PREFIX_skin.ply, _skull.ply, _mandible.ply, _landmarks.json, PREFIX.mrk.json (3D Slicer
-/// fiducials, LPS) and the scenes PREFIX_jaw_opening.yaml and PREFIX_jaw_advance.yaml, each
-/// complete or not at all. Returns their paths. Throws InputError where a file cannot be written.
+/// Returns the paths of the files of a head: PREFIX_skin.ply, _skull.ply, _mandible.ply,
+/// _landmarks.json, PREFIX.mrk.json (3D Slicer fiducials, LPS) and the scenes
+/// PREFIX_jaw_opening.yaml and PREFIX_jaw_advance.yaml.
+std::vector<std::filesystem::path> phantom_files(const std::filesystem::path& prefix);
+
+/// Writes these files, each complete or not at all, and returns their paths. Throws InputError
+/// where a file cannot be written.
 std::vector<std::filesystem::path> write_phantom(const std::filesystem::path& prefix,
                                                  const Phantom& phantom,
                                                  PhantomTissue tissue = PhantomTissue::solid);
