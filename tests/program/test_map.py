@@ -318,6 +318,17 @@ def test_a_damaged_sample_is_solved_again(tmp_path):
     assert store.load(u).converged
 
 
+def test_a_sample_that_is_not_written_leaves_no_part(tmp_path, monkeypatch):
+    def savez(file, **_):
+        file.write(b"PK")
+        raise OSError("no space")
+    monkeypatch.setattr(samples.np, "savez", savez)
+    store = SampleStore(tmp_path, "key")
+    with pytest.raises(OSError, match="no space"):
+        store.save(Sample(np.zeros(1), np.zeros((2, 3)), np.zeros((1, 2, 3)), True))
+    assert not list(store.folder.iterdir())
+
+
 @pytest.mark.parametrize("motion, words", [
     ({"translate": [0, 1]}, "'jaw': translate must be three finite numbers"), ({"turn": [1, 0, 0]}, "'jaw': turn: "),
     ({"rotate": [0, 1, 0, 9]}, "'jaw': rotate must be three finite numbers")])

@@ -97,10 +97,13 @@ class SampleStore:
     def save(self, sample):
         path = self.path(sample.u)
         part = path.with_suffix(f".{os.getpid()}.{threading.get_ident()}.part")
-        with part.open("wb") as file:
-            np.savez(file, u=sample.u, displacement=sample.displacement.astype("f4"),
-                     slopes=sample.slopes.astype("f4"), converged=sample.converged)
-        part.replace(path)
+        try:
+            with part.open("wb") as file:
+                np.savez(file, u=sample.u, displacement=sample.displacement.astype("f4"),
+                         slopes=sample.slopes.astype("f4"), converged=sample.converged)
+            part.replace(path)
+        finally:
+            part.unlink(missing_ok=True)
 
 
 def solve_sample(session, box, u, accuracy, tangents=True):
