@@ -163,10 +163,8 @@ std::vector<Vec3> points_in(const std::string& file) {
   return points;
 }
 
-/// Proposes points in skull and jaw and writes them beside the meshes, for correction.
-std::array<std::vector<Vec3>, 2> write_points(const imaging::Volume& volume, double level,
-                                              const std::string& output) {
-  auto points = tools::bone_separation::propose_points(volume, level);
+/// Writes points proposed in skull and jaw beside the meshes, for correction.
+void write_points(const std::array<std::vector<Vec3>, 2>& points, const std::string& output) {
   for (int part = 0; part < 2; ++part) {
     scene::Landmarks named;
     for (size_t n = 0; n < points[part].size(); ++n)
@@ -177,7 +175,6 @@ std::array<std::vector<Vec3>, 2> write_points(const imaging::Volume& volume, dou
     std::printf("%s: %zu points proposed in the %s\n", file.c_str(), points[part].size(),
                 part == 0 ? "skull" : "jaw");
   }
-  return points;
 }
 
 /// Notes that bones are hardly to be parted where voxels are as large as their joints.
@@ -199,11 +196,12 @@ void write_apart(const imaging::Volume& volume, imaging::Extraction requested,
   base::Progress progress(MPI_COMM_WORLD);
   note_large_voxels(volume);
   progress.show("parting the bones", -1);
-  const tools::bone_separation::PartedBones bones = tools::bone_separation::part_bones(
-      volume, *requested.level,
-      files.empty() ? write_points(volume, *requested.level, output)
-                    : std::array{points_in(files[0]), points_in(files[1])});
+  const auto points = files.empty()
+                          ? tools::bone_separation::propose_points(volume, *requested.level)
+                          : std::array{points_in(files[0]), points_in(files[1])};
+  const auto bones = tools::bone_separation::part_bones(volume, *requested.level, points);
   progress.clear();
+  if (files.empty()) write_points(points, output);
   std::printf("  parted where voxels share %.0f mm²\n", bones.cut_area);
   for (int part = 0; part < 2; ++part)
     write_one(bones.parts[part], requested, numbered(output, part + 1));
