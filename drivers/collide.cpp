@@ -17,18 +17,11 @@ using namespace repose;
 using base::OptionKind;
 
 std::vector<base::Option> option_table() {
-  return {{.name = "clearance",
-           .kind = OptionKind::number,
-           .default_text = "",
-           .help = "Distance to be kept between bones (default 0).",
-           .range = {0, 50},
-           .unit = "mm"},
-          {.name = "tolerance",
-           .kind = OptionKind::number,
-           .default_text = "",
-           .help = "How much sooner than at contact the moves may end (default 0.05).",
-           .range = {1e-4, 10},
-           .unit = "mm"}};
+  return {{"clearance", OptionKind::number, "", "Distance to be kept between bones (default 0).",
+           base::Range::between(0, 50), "mm"},
+          {"tolerance", OptionKind::number, "",
+           "How much sooner than at contact the moves may end (default 0.05).",
+           base::Range::between(1e-4, 10), "mm"}};
 }
 
 void report(const base::Options& options) {

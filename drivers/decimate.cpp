@@ -22,21 +22,15 @@ using namespace repose;
 using base::OptionKind;
 
 std::vector<base::Option> option_table() {
-  return {
-      {.name = "distance",
-       .kind = OptionKind::number,
-       .default_text = "",
-       .help = "No point of the result is farther than this from the input (proven).",
-       .range = base::Range::above(0),
-       .unit = "mm"},
-      {.name = "triangles",
-       .kind = OptionKind::integer,
-       .default_text = "",
-       .help = "Stop at this many triangles; without -distance the distance reached is printed.",
-       .range = base::Range::at_least(4)},
-      {"landmarks", OptionKind::path, "",
-       "Points whose nearest vertices stay (.mrk.json, .fcsv, .csv)."},
-      {"output", OptionKind::path, "decimated.ply", "The file to write (PLY)."}};
+  return {{"distance", OptionKind::number, "",
+           "No point of the result is farther than this from the input (proven).",
+           base::Range::above(0), "mm"},
+          {"triangles", OptionKind::integer, "",
+           "Stop at this many triangles; without -distance the distance reached is printed.",
+           base::Range::at_least(4)},
+          {"landmarks", OptionKind::path, "",
+           "Points whose nearest vertices stay (.mrk.json, .fcsv, .csv)."},
+          {"output", OptionKind::path, "decimated.ply", "The file to write (PLY)."}};
 }
 
 tools::decimation::DecimateOptions requested(const base::Options& options) {

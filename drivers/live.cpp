@@ -17,12 +17,10 @@ int main(int argc, char** argv) {
   using namespace repose;
   base::Options options(argc, argv, "Builds a scene once and solves it for many plans, on request.",
                         {{"SCENE", "scene (.yaml) with a plan"}},
-                        {{.name = "port",
-                          .kind = base::OptionKind::integer,
-                          .default_text = "",
-                          .help = "Answer on this port of 127.0.0.1 in place of standard input; 0: "
-                                  "a free one. Prints port and token as JSON.",
-                          .range = {0, 65535}}});
+                        {{"port", base::OptionKind::integer, "",
+                          "Answer on this port of 127.0.0.1 in place of standard input; 0: "
+                          "a free one. Prints port and token as JSON.",
+                          base::Range::between(0, 65535)}});
   // Standard output is for answers alone: what else is printed goes to standard error.
   const int output = dup(STDOUT_FILENO);
   if (!options.help_requested()) dup2(STDERR_FILENO, STDOUT_FILENO);

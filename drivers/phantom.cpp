@@ -18,11 +18,10 @@ using namespace repose;
 using base::OptionKind;
 
 std::vector<base::Option> option_table() {
-  return {{.name = "skin_vertices",
-           .kind = OptionKind::integer,
-           .default_text = "2000",
-           .help = "Vertices of the skin; 477 is the paper's mesh.",
-           .range = {tools::phantom::phantom_vertices_min, tools::phantom::phantom_vertices_max}},
+  return {{"skin_vertices", OptionKind::integer, "2000",
+           "Vertices of the skin; 477 is the paper's mesh.",
+           base::Range::between(tools::phantom::phantom_vertices_min,
+                                tools::phantom::phantom_vertices_max)},
           {.name = "bone_edge",
            .kind = OptionKind::number,
            .default_text = "auto",

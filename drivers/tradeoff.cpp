@@ -45,18 +45,11 @@ std::vector<base::Option> option_table() {
       {"layers", OptionKind::text, "2,3,4,6", "Point layers, 2 … 64; a comma for none."},
       {"edges", OptionKind::text, "",
        "mm, edges of a remeshed skin; a comma for none (default 1.5 and 2 times its own)."},
-      {.name = "reference",
-       .kind = OptionKind::number,
-       .default_text = "1e-8",
-       .help = "Accuracy of the reference.",
-       .range = {1e-12, 1},
-       .unit = "mm"},
-      {.name = "time_limit",
-       .kind = OptionKind::number,
-       .default_text = "60",
-       .help = "Of one run; a reference may take four times as long.",
-       .range = {1e-3, 1e6},
-       .unit = "s"}};
+      {"reference", OptionKind::number, "1e-8", "Accuracy of the reference.",
+       base::Range::between(1e-12, 1), "mm"},
+      {"time_limit", OptionKind::number, "60",
+       "Of one run; a reference may take four times as long.", base::Range::between(1e-3, 1e6),
+       "s"}};
 }
 
 std::vector<std::string> words_of(const base::Options& options, const char* name) {

@@ -23,11 +23,7 @@ Keys joined(const std::vector<Keys>& parts) {
 /// A key whose value is one of some words.
 Key one_of(const std::string& path, const char* standard, std::vector<std::string> words,
            const char* sentence) {
-  return {.path = path,
-          .kind = choice,
-          .standard = standard,
-          .sentence = sentence,
-          .choices = std::move(words)};
+  return {path, choice, standard, sentence, "", {}, std::move(words)};
 }
 
 /// The keys of a surface taken from a volume, below `above`.
