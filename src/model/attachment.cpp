@@ -24,7 +24,7 @@ std::vector<scene::Attach> requested_attachments(const Columns& columns, const s
   for (size_t k = 0; k < tissue.attach_regions.size(); ++k) {
     const scene::Region& where = tissue.attach_regions[k].where;
     const scene::Attach how = tissue.attach_regions[k].attach;
-    const bool segmented = std::holds_alternative<scene::MeshRegion>(where) ||
+    const bool segmented = std::holds_alternative<scene::ClosedMesh>(where) ||
                            std::holds_alternative<scene::LabelRegion>(where);
     const Contains inside = contains_of(where, segmented ? near : 0);
     int64_t met = 0;

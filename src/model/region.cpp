@@ -14,7 +14,7 @@
 namespace repose::model {
 namespace {
 
-Contains inside(const scene::SphereRegion& sphere, double near) {
+Contains inside(const scene::Sphere& sphere, double near) {
   return [=](const Vec3& x) { return (x - sphere.center).norm() <= sphere.radius + near; };
 }
 
@@ -43,7 +43,7 @@ Contains inside(const scene::CurveRegion& curve, double near) {
   };
 }
 
-Contains inside(const scene::MeshRegion& mesh, double near) {
+Contains inside(const scene::ClosedMesh& mesh, double near) {
   const surface::Surface read = surface::read_surface(mesh.file);
   const surface::Defects defects = surface::inspect(read, false);
   if (defects.border_edges > 0 || defects.non_manifold_edges > 0)

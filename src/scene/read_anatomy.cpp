@@ -145,7 +145,7 @@ void read_septum(const Value& anatomy, Scene& scene) {
                           {edges, {septum->number(), material.deep.poisson}});
   std::vector<AttachRegion>& attach = scene.tissue.attach_regions;
   attach.insert(attach.begin(),
-                {SphereRegion{edges.path.front(), reach}, Attach::contact, scene.anatomy->gap});
+                {Sphere{edges.path.front(), reach}, Attach::contact, scene.anatomy->gap});
   scene.remarks.push_back(fmt::format(
       "septum by landmarks: {:g} N/mm² within {:g} mm of the lines from the nasal spine to "
       "pronasale to nasion (material region 0), not held by bone within {:g} mm of the spine",

@@ -10,32 +10,21 @@ Vec3 read_direction(const Value& value) {
   return direction;
 }
 
-Instrument read_instrument(const Map& map) {
-  Instrument instrument{{}, read_direction(map.at("push"))};
-  if (const auto skin = map.find("skin")) instrument.slide = skin->choice() == 1;
-  int shapes = 0;
-  const auto shape = [&](const char* name, const auto& read) {
-    if (const auto value = map.find(name)) {
-      instrument.shape = read(*value);
-      ++shapes;
-    }
-  };
-  shape("sphere", [](const Value& value) {
-    const Map of(value);
-    return Sphere{of.at("center").vector(), of.at("radius").number()};
-  });
-  shape("capsule", [](const Value& value) {
-    const Map of(value);
+decltype(Instrument::shape) read_shape(const Map& map) {
+  const std::string kind = map.only({"sphere", "capsule", "box", "half_space", "mesh"});
+  const Value value = map.at(kind);
+  if (kind == "mesh") return ClosedMesh{value.file()};
+  const Map of(value);
+  if (kind == "sphere") return read_sphere(of);
+  if (kind == "box") return read_box(of);
+  if (kind == "capsule")
     return Capsule{of.at("from").vector(), of.at("to").vector(), of.at("radius").number()};
-  });
-  shape("box", [](const Value& value) { return read_box(Map(value)); });
-  shape("half_space", [](const Value& value) {
-    const Map of(value);
-    return HalfSpace{of.at("point").vector(), read_direction(of.at("normal"))};
-  });
-  shape("mesh", [](const Value& value) { return ClosedMesh{value.file()}; });
-  if (shapes != 1)
-    map.itself().refuse("must hold exactly one of sphere, capsule, box, half_space, mesh");
+  return HalfSpace{of.at("point").vector(), read_direction(of.at("normal"))};
+}
+
+Instrument read_instrument(const Map& map) {
+  Instrument instrument{read_shape(map), read_direction(map.at("push"))};
+  if (const auto skin = map.find("skin")) instrument.slide = skin->choice() == 1;
   return instrument;
 }
 

@@ -1,7 +1,5 @@
 #include "readers.h"
 
-#include <optional>
-
 #include "bone_names.h"
 #include "clinical_move.h"
 #include "repose/base/text.h"
@@ -60,12 +58,13 @@ class Forms {
   /// reads that form.
   template <class Clinical>
   RigidMotion read_entry(const Map& entry, const RigidMotion& before, const Clinical& clinical) {
-    const Value form =
-        only_form(entry, {"translate", "rotate", "landmark", "transform", "clinical"});
-    if (const auto list = entry.find("translate")) return read_translations(*list);
-    if (const auto list = entry.find("rotate")) return read_rotations(*list);
-    if (entry.find("landmark")) return read_landmark(form, before);
-    if (entry.find("clinical")) return clinical(form);
+    const std::string kind =
+        entry.only({"translate", "rotate", "landmark", "transform", "clinical"}, several_advice);
+    const Value form = entry.at(kind);
+    if (kind == "translate") return read_translations(form);
+    if (kind == "rotate") return read_rotations(form);
+    if (kind == "landmark") return read_landmark(form, before);
+    if (kind == "clinical") return clinical(form);
     const bool several = form.is_list() && !is_matrix(form);
     if (!several) return read_matrix_or_file(form);
     return in_order(form, form.items(), [&](const Value& one, const RigidMotion& so_far) {
@@ -74,22 +73,6 @@ class Forms {
   }
 
  private:
-  /// The value of the one form that a map holds.
-  static Value only_form(const Map& map, const std::vector<std::string>& names) {
-    std::optional<Value> form;
-    int forms = 0;
-    for (const std::string& name : names)
-      if (const auto value = map.find(name)) {
-        form.emplace(*value);
-        ++forms;
-      }
-    if (forms == 1) return *form;
-    map.itself().refuse(
-        "must hold exactly one of {}; for several give several entries, or a list: transform: "
-        "[{{rotate: ...}}, {{translate: ...}}]",
-        fmt::join(names, ", "));
-  }
-
   /// Each of several by `read`, the first applied first.
   template <class Read>
   static RigidMotion in_order(const Value& list, const std::vector<Value>& several,
@@ -125,9 +108,10 @@ class Forms {
   RigidMotion read_item(const Value& value, const RigidMotion& before) {
     if (!value.is_map()) return read_matrix_or_file(value);
     const Map map(value);
-    const Value form = only_form(map, {"translate", "rotate", "landmark"});
-    if (map.find("translate")) return read_translation(form);
-    return map.find("rotate") ? read_rotation(form) : read_landmark(form, before);
+    const std::string kind = map.only({"translate", "rotate", "landmark"}, several_advice);
+    const Value form = map.at(kind);
+    if (kind == "translate") return read_translation(form);
+    return kind == "rotate" ? read_rotation(form) : read_landmark(form, before);
   }
 
   RigidMotion read_landmark(const Value& value, const RigidMotion& before) {
@@ -163,6 +147,8 @@ class Forms {
   }
 
   static constexpr double residual_worth_saying = 0.05;  // mm
+  static constexpr const char* several_advice =
+      "; for several give several entries, or a list: transform: [{rotate: ...}, {translate: ...}]";
   const std::map<std::string, Vec3>& landmarks_;
   std::vector<std::string>& remarks_;
 };

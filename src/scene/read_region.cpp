@@ -1,7 +1,5 @@
 #include "readers.h"
 
-#include <fmt/ranges.h>
-
 #include <limits>
 
 namespace repose::scene {
@@ -28,35 +26,29 @@ PaintedRegion read_painted(const Value& value) {
   return region;
 }
 
-/// Which of the keys the item has, of which it must have one.
-std::string kind_of(const Map& map, const std::vector<std::string>& kinds) {
-  std::vector<std::string> given;
-  for (const std::string& kind : kinds)
-    if (map.find(kind)) given.push_back(kind);
-  if (given.size() != 1) map.itself().refuse("needs exactly one of {}", fmt::join(kinds, ", "));
-  return given.front();
-}
-
 Region read_space(const std::string& kind, const Map& map) {
   const Value value = map.at(kind);
-  if (kind == "mesh") return MeshRegion{value.file()};
+  if (kind == "mesh") return ClosedMesh{value.file()};
   if (kind == "volume") return LabelRegion{value.file_or_folder(), map.at("label").integer()};
   if (kind == "curve") return CurveRegion{read_path(value), map.at("radius").number()};
   if (kind == "box") return read_box(Map(value));
-  const Map ball(value);
-  return SphereRegion{ball.at("center").vector(), ball.at("radius").number()};
+  return read_sphere(Map(value));
 }
 
 }  // namespace
 
 Region read_region(const Map& map) {
-  return read_space(kind_of(map, {"sphere", "box", "mesh", "volume", "curve"}), map);
+  return read_space(map.only({"sphere", "box", "mesh", "volume", "curve"}), map);
 }
 
 SkinRegion read_skin_region(const Map& map) {
-  const std::string kind = kind_of(map, {"sphere", "box", "mesh", "volume", "curve", "painted"});
+  const std::string kind = map.only({"sphere", "box", "mesh", "volume", "curve", "painted"});
   if (kind == "painted") return read_painted(map.at(kind));
   return read_space(kind, map);
+}
+
+Sphere read_sphere(const Map& map) {
+  return {map.at("center").vector(), map.at("radius").number()};
 }
 
 Box read_box(const Map& map) {

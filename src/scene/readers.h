@@ -53,6 +53,7 @@ void read_osteotomies(const Value& list, Scene& scene);
 Region read_region(const Map& map);
 /// Reads a region, or with the key painted the painted part of a mesh of the skin.
 SkinRegion read_skin_region(const Map& map);
+Sphere read_sphere(const Map& map);
 Box read_box(const Map& map);
 
 }  // namespace repose::scene

@@ -289,4 +289,12 @@ Value Map::at(const std::string& name) const {
   itself_.refuse("lacks the key '{}': {}", name, expected(find_key(joined(itself_.path_, name))));
 }
 
+std::string Map::only(const std::vector<std::string>& names, std::string_view advice) const {
+  std::vector<std::string> given;
+  for (const std::string& name : names)
+    if (find(name)) given.push_back(name);
+  if (given.size() == 1) return given.front();
+  itself_.refuse("must hold exactly one of {}{}", fmt::join(names, ", "), advice);
+}
+
 }  // namespace repose::scene

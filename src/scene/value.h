@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -97,6 +98,9 @@ class Map {
   explicit Map(const Value& value);
   std::optional<Value> find(const std::string& name) const;
   Value at(const std::string& name) const;
+  /// Returns the one of these keys that is given. Refuses none and several; `advice` ends the
+  /// message.
+  std::string only(const std::vector<std::string>& names, std::string_view advice = {}) const;
   const Value& itself() const { return itself_; }
 
  private:

@@ -48,7 +48,7 @@ REFUSED = {
         "  material: {skin: {thickness: 1, young: 1}, strata: [{thickness: 1, young: 1}]}", "",
         "exclude each other"),
     "region": ("  material: {regions: [{young: 1}]}", "", 
-               "needs exactly one of sphere, box, mesh, volume, curve, painted"),
+               "must hold exactly one of sphere, box, mesh, volume, curve, painted"),
     "unpainted": (PAINTED.format("color: [0, 0, 255]"), "", "none of its 4 vertices is painted"),
     "uncolored": (PAINTED.format("property: quality"), "", "no property 'quality'; they have red"),
     "two paints": (PAINTED.format("color: [0, 0, 255], property: quality"), "",

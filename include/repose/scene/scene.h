@@ -76,7 +76,7 @@ struct SpringRule {
   std::optional<double> reference;  ///< s_ref in mm; 0 means "initial": s_ref = r_0 of each spring
 };
 
-struct SphereRegion {
+struct Sphere {
   Vec3 center;    ///< mm
   double radius;  ///< mm
 };
@@ -99,7 +99,7 @@ struct LabelRegion {
 };
 
 /// The inside of a closed triangle mesh.
-struct MeshRegion {
+struct ClosedMesh {
   std::filesystem::path file;  ///< absolute
 };
 
@@ -130,7 +130,7 @@ struct CurveRegion {
   double radius;           ///< mm
 };
 
-using Region = std::variant<SphereRegion, Box, TurnedBox, MeshRegion, LabelRegion, CurveRegion>;
+using Region = std::variant<Sphere, Box, TurnedBox, ClosedMesh, LabelRegion, CurveRegion>;
 using SkinRegion = std::variant<Region, PaintedRegion>;
 
 /// Attachment of tissue that ends at bone: it moves with it; it keeps its distance and slides
@@ -208,11 +208,6 @@ struct Force {
   Vec3 force;     ///< N, in total
 };
 
-struct Sphere {
-  Vec3 center;    ///< mm
-  double radius;  ///< mm
-};
-
 /// The points within a radius of a segment.
 struct Capsule {
   Vec3 from, to;  ///< mm
@@ -223,10 +218,6 @@ struct Capsule {
 struct HalfSpace {
   Vec3 point;   ///< mm
   Vec3 normal;  ///< any length but 0
-};
-
-struct ClosedMesh {
-  std::filesystem::path file;  ///< absolute
 };
 
 /// A rigid body at its place before it is pushed into the tissue, and by what.

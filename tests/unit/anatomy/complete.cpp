@@ -41,7 +41,7 @@ Completed complete_head(const std::string& skin_file, const std::string& skull_f
   done.scene.anatomy = plan;
   done.scene.tissue.material = scene::Material{};
   done.scene.tissue.attach_regions.push_back(
-      {scene::SphereRegion{Vec3::Zero(), 1}, scene::Attach::slide, 0});
+      {scene::Sphere{Vec3::Zero(), 1}, scene::Attach::slide, 0});
   complete(skin, done.scene, done.remarks);
   return done;
 }

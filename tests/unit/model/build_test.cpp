@@ -163,7 +163,7 @@ TEST(Build, an_unattached_region_is_let_go_and_its_columns_stay_as_they_are) {
   const surface::Surface skin = patches::square(20, 100);
   const BuiltModel held = build_model(scene, skin, {kFlatBone});
   scene::AttachRegion& region = scene.tissue.attach_regions.emplace_back();
-  region = {scene::SphereRegion{{50, 50, -10}, 20.1}, scene::Attach::contact};
+  region = {scene::Sphere{{50, 50, -10}, 20.1}, scene::Attach::contact};
   const BuiltModel built = build_model(scene, skin, {kFlatBone});
   int64_t let_go = 0;
   for (size_t i = 2; i < built.model.points.position.size(); i += 3) {

@@ -15,9 +15,9 @@ class Regions : public ::testing::Test {
   std::vector<scene::Region> every_kind() const {
     const surface::Surface box = patches::box({-10, -10, -10}, {10, 10, 10});
     surface::write_ply(folder_.path("box.ply"), box);
-    return {scene::SphereRegion{{0, 0, 0}, 10}, scene::Box{{0, 0, 0}, {20, 40, 60}},
+    return {scene::Sphere{{0, 0, 0}, 10}, scene::Box{{0, 0, 0}, {20, 40, 60}},
             scene::CurveRegion{{{0, -5, 0}, {0, 0, 0}, {0, 5, 0}}, 10},
-            scene::MeshRegion{folder_.path("box.ply")}};
+            scene::ClosedMesh{folder_.path("box.ply")}};
   }
   test::Folder folder_;
 };

@@ -130,8 +130,7 @@ TEST(Septum, StiffensTheNoseBelowTheScenesOwnRegions) {
   EXPECT_TRUE(read(marks, "").tissue.material->regions.empty());
   ASSERT_EQ(scene.tissue.attach_regions.size(), 1u);
   EXPECT_EQ(scene.tissue.attach_regions[0].attach, Attach::contact);
-  expect_near(std::get<SphereRegion>(scene.tissue.attach_regions[0].where).center,
-              marks["nasal_spine"]);
+  expect_near(std::get<Sphere>(scene.tissue.attach_regions[0].where).center, marks["nasal_spine"]);
   EXPECT_NE(refusal([&] {
               read(marks, "", ", septum: 1",
                    "layers: 4, springs: {default: {stiffness: 1.0, law: "

@@ -145,7 +145,7 @@ TEST(Scene, FullTissue) {
   EXPECT_EQ(tissue.release, 0);
   ASSERT_EQ(tissue.attach_regions.size(), 1u);
   EXPECT_EQ(tissue.attach_regions[0].attach, Attach::contact);
-  const auto& ball = std::get<SphereRegion>(tissue.attach_regions[0].where);
+  const auto& ball = std::get<Sphere>(tissue.attach_regions[0].where);
   EXPECT_EQ(ball.center, Vec3(0, 80, -30));
   EXPECT_EQ(ball.radius, 20);
   EXPECT_EQ(tissue.turgor, 0.05);

@@ -50,7 +50,7 @@ model::Anatomy rich(int squares) {
   model::Anatomy anatomy = jaws(squares);
   scene::Tissue& tissue = anatomy.scene.tissue;
   tissue.material->strata = {{1.5, {0.1, 0.4}}};
-  tissue.material->regions = {{scene::Region{scene::SphereRegion{{30, 50, -5}, 20}}, {0.05, 0.3}}};
+  tissue.material->regions = {{scene::Region{scene::Sphere{{30, 50, -5}, 20}}, {0.05, 0.3}}};
   tissue.material->dilatation = scene::Dilatation::nodal;
   tissue.depths_mm = {0, 1.5};
   tissue.turgor = 0.05;
@@ -481,7 +481,7 @@ TEST(Raise, a_prestress_of_next_to_no_weight_is_balanced_to_rounding) {
 TEST(Raise, a_region_that_holds_no_prism_is_refused_on_all_ranks) {
   model::Anatomy anatomy = rich(12);
   anatomy.scene.tissue.material->regions = {
-      {scene::Region{scene::SphereRegion{{0, 0, 500}, 1}}, {0.05, 0.3}}};
+      {scene::Region{scene::Sphere{{0, 0, 500}, 1}}, {0.05, 0.3}}};
   EXPECT_THROW(build_local(anatomy), base::InputError);
 }
 
