@@ -175,17 +175,17 @@ void check_adhesion(const Model& model, const std::vector<Film>& films, Comparis
   if (elements && wrong.empty()) check_planes(model, *elements, films, comparison);
 }
 
-std::vector<FilmState> evaluate(const Model& model, const std::vector<Film>& films,
-                                const model::PrescribedMotion& motion, double load,
-                                const std::vector<Vec3>& position) {
-  std::vector<FilmState> states;
+std::vector<PointForce> evaluate(const Model& model, const std::vector<Film>& films,
+                                 const model::PrescribedMotion& motion, double load,
+                                 const std::vector<Vec3>& position) {
+  std::vector<PointForce> forces;
   for (const Film& film : films) {
     const Mat4 pose = motion.bone_matrix(film.bone, load);
     const Mat3 turn = pose.topLeftCorner<3, 3>();
     const Vec3 start = turn * model.points.position[film.point] + pose.topRightCorner<3, 1>();
     const Vec3 normal = turn * film.normal, &at = position[film.point];
     const double range = model.adhesion->range, s = normal.dot(at - start) / range;
-    FilmState state{0, Vec3::Zero(), 0};
+    PointForce state{film.point, 0, Vec3::Zero(), 0};
     if (s > 0) {
       const double root = std::hypot(1.0, s);
       state.energy = film.tension * range * (root - 1);
@@ -193,9 +193,9 @@ std::vector<FilmState> evaluate(const Model& model, const std::vector<Film>& fil
     }
     const double size = at.lpNorm<Eigen::Infinity>();
     state.noise = film.tension * size * (1 / range + 1 / film.distance);
-    states.push_back(state);
+    forces.push_back(state);
   }
-  return states;
+  return forces;
 }
 
 }  // namespace repose::tools::check

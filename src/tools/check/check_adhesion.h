@@ -27,15 +27,16 @@ std::vector<Film> find_films(const model::Model& model);
 void check_adhesion(const model::Model& model, const std::vector<Film>& films,
                     Comparison& comparison);
 
-/// Energy and force of a film at given positions.
-struct FilmState {
+/// An energy of the position of one point, and its force.
+struct PointForce {
+  int64_t point;
   double energy;  ///< N mm
-  Vec3 force;     ///< N, on its point
+  Vec3 force;     ///< N, on the point
   double noise;   ///< N; times the relative rounding of positions, that of the force
 };
 /// Evaluates the films at a load and the positions of all points (mm).
-std::vector<FilmState> evaluate(const model::Model& model, const std::vector<Film>& films,
-                                const model::PrescribedMotion& motion, double load,
-                                const std::vector<Vec3>& position);
+std::vector<PointForce> evaluate(const model::Model& model, const std::vector<Film>& films,
+                                 const model::PrescribedMotion& motion, double load,
+                                 const std::vector<Vec3>& position);
 
 }  // namespace repose::tools::check

@@ -4,8 +4,6 @@
 
 #include <set>
 
-#include "check_adhesion.h"
-
 namespace repose::tools::check {
 
 namespace {
@@ -37,12 +35,12 @@ std::string first_wrong(const model::Model& model, const model::TermElements& su
 
 }  // namespace
 
-std::vector<SupportState> evaluate_supports(const model::Model& model,
-                                            const model::PrescribedMotion& motion, double load,
-                                            const std::vector<Vec3>& position) {
-  std::vector<SupportState> states;
+std::vector<PointForce> evaluate_supports(const model::Model& model,
+                                          const model::PrescribedMotion& motion, double load,
+                                          const std::vector<Vec3>& position) {
+  std::vector<PointForce> forces;
   const model::TermElements* supports = elements_of(model, "elastic_support");
-  if (!supports || !has_shape(*supports)) return states;
+  if (!supports || !has_shape(*supports)) return forces;
   for (size_t e = 0; e < supports->size(); ++e) {
     const int64_t point = supports->points_of(e)[0];
     const auto numbers = supports->numbers_of(e);
@@ -50,10 +48,10 @@ std::vector<SupportState> evaluate_supports(const model::Model& model,
     const Vec3 place = pose.topLeftCorner<3, 3>() * Vec3(numbers[0], numbers[1], numbers[2]) +
                        pose.topRightCorner<3, 1>();
     const Vec3 way = position[point] - place;
-    states.push_back({point, numbers[3] * way.squaredNorm() / 2, -numbers[3] * way,
+    forces.push_back({point, numbers[3] * way.squaredNorm() / 2, -numbers[3] * way,
                       numbers[3] * position[point].lpNorm<Eigen::Infinity>()});
   }
-  return states;
+  return forces;
 }
 
 void check_supports(const model::Model& model, Comparison& comparison) {

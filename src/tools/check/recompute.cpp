@@ -71,8 +71,9 @@ class Recomputation {
     springs();
     edges();
     terms();
-    adhesion();
-    supports();
+    // All films are closed at the initial state.
+    add_forces(evaluate(model_, films_, motion_, claimed_.load, x_));
+    add_forces(evaluate_supports(model_, motion_, claimed_.load, x_));
     contact();
     forces();
     gradient_.assign(x_.size(), Vec3::Zero());
@@ -95,8 +96,7 @@ class Recomputation {
   void springs();
   void edges();
   void terms();
-  void adhesion();
-  void supports();
+  void add_forces(const std::vector<PointForce>& forces);
   void contact();
   void forces();
   void nodal_volumes();
@@ -304,24 +304,9 @@ void Recomputation::terms() {
   }
 }
 
-// All films are closed at the initial state.
-void Recomputation::adhesion() {
-  const std::vector<FilmState> states = evaluate(model_, films_, motion_, claimed_.load, x_);
+void Recomputation::add_forces(const std::vector<PointForce>& forces) {
   double uncertain = 0;
-  for (size_t f = 0; f < films_.size(); ++f) {
-    const int64_t point = films_[f].point;
-    const FilmState& state = states[f];
-    step_.f_e.value += state.energy;
-    uncertain += state.energy + step_.scale.position * state.force.norm();
-    if (soft(point)) step_.rows.residual_force[point] += state.force;
-    at_point_[point] += state.force.norm() + state.noise;
-  }
-  step_.f_e.scale += rounding * uncertain / tolerance + std::abs(step_.f_e.value);
-}
-
-void Recomputation::supports() {
-  double uncertain = 0;
-  for (const SupportState& state : evaluate_supports(model_, motion_, claimed_.load, x_)) {
+  for (const PointForce& state : forces) {
     step_.f_e.value += state.energy;
     uncertain += state.energy + step_.scale.position * state.force.norm();
     if (soft(state.point)) step_.rows.residual_force[state.point] += state.force;
