@@ -8,12 +8,11 @@ Needs: apt-get install --no-install-recommends chromium python3-numpy
 """
 
 import pathlib
-import subprocess
 import sys
-import tempfile
 import threading
 
 from page import PROJECT, option_parser
+from browser import browse  # page knows where it is
 
 sys.path[:0] = [str(PROJECT / "drivers/python"), str(PROJECT / "drivers")]
 import live  # noqa: E402
@@ -35,14 +34,9 @@ def main():
         server, address = live.make_server(session, chosen.scene)
         server.page = server.page.replace(b"</body>", VIEW.encode())
         threading.Thread(target=server.serve_forever, daemon=True).start()
-        with server, tempfile.TemporaryDirectory() as profile:
-            subprocess.run(
-                ["chromium", "--headless=new", "--no-sandbox", "--disable-gpu",
-                 "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--hide-scrollbars",
-                 "--disable-background-networking", f"--user-data-dir={profile}",
-                 f"--window-size={chosen.size}", "--virtual-time-budget=40000",
-                 f"--screenshot={chosen.output.resolve()}", address], check=True,
-                capture_output=True, timeout=300)
+        with server:
+            browse(address, "--virtual-time-budget=40000", f"--screenshot={chosen.output.resolve()}",
+                   size=chosen.size.split(","), seconds=300, check=True)
             server.shutdown()
 
 

@@ -7,10 +7,10 @@ Needs: apt-get install --no-install-recommends chromium
 """
 
 import pathlib
-import subprocess
 import tempfile
 
 from page import PROJECT, option_parser
+from browser import browse  # page knows where it is
 
 VIEW = """<script>(async () => {
   while (!document.documentElement.dataset.ready) await new Promise(end => setTimeout(end, 30));
@@ -29,12 +29,8 @@ def main():
     with tempfile.TemporaryDirectory() as folder:
         copy = pathlib.Path(folder) / "page.html"
         copy.write_text(chosen.page.read_text(encoding="utf-8").replace("</body>", VIEW), encoding="utf-8")
-        subprocess.run(
-            ["chromium", "--headless=new", "--no-sandbox", "--disable-gpu", "--use-angle=swiftshader",
-             "--enable-unsafe-swiftshader", "--hide-scrollbars", "--disable-background-networking",
-             f"--user-data-dir={folder}/profile", f"--window-size={chosen.size}",
-             "--virtual-time-budget=6000", f"--screenshot={chosen.output.resolve()}", copy.as_uri()],
-            check=True, capture_output=True, timeout=300)
+        browse(copy, "--virtual-time-budget=6000", f"--screenshot={chosen.output.resolve()}",
+               size=chosen.size.split(","), seconds=300, check=True)
 
 
 if __name__ == "__main__":

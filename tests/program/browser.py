@@ -1,4 +1,4 @@
-"""Pages in headless Chromium: what a script finds in them, and pictures of them. No network."""
+"""Pages in headless Chromium: what a script finds in them, and pictures of them. Files get no network."""
 
 import contextlib
 import json
@@ -11,8 +11,7 @@ import pytest
 
 CHROMIUM = shutil.which("chromium")
 OPTIONS = ["--headless=new", "--no-sandbox", "--disable-gpu", "--use-angle=swiftshader",
-           "--enable-unsafe-swiftshader", "--disable-background-networking", "--hide-scrollbars",
-           "--host-resolver-rules=MAP * ~NOTFOUND"]
+           "--enable-unsafe-swiftshader", "--disable-background-networking", "--hide-scrollbars"]
 FOUND = re.compile(r'<pre id="found">(.*?)</pre>', re.S)
 
 
@@ -21,13 +20,14 @@ def needs_browser():
         pytest.skip("Chromium is not installed (apt-get install --no-install-recommends chromium)")
 
 
-def browse(page, *options, size=(500, 500), seconds=100):
-    """Runs Chromium on a page; what it prints."""
+def browse(page, *options, size=(500, 500), seconds=100, check=False):
+    """Runs Chromium on a page, a file or an address; returns what it prints."""
     needs_browser()
+    place = [page] if isinstance(page, str) else ["--host-resolver-rules=MAP * ~NOTFOUND", page.as_uri()]
     with tempfile.TemporaryDirectory() as profile:
         command = [CHROMIUM, *OPTIONS, f"--user-data-dir={profile}",
-                   f"--window-size={size[0]},{size[1]}", *options, page.as_uri()]
-        return subprocess.run(command, capture_output=True, text=True, timeout=seconds).stdout
+                   f"--window-size={size[0]},{size[1]}", *options, *place]
+        return subprocess.run(command, capture_output=True, text=True, timeout=seconds, check=check).stdout
 
 
 @contextlib.contextmanager

@@ -4,9 +4,7 @@ import importlib.util
 import json
 import os
 import re
-import subprocess
 import sys
-import tempfile
 import threading
 import types
 import urllib.error
@@ -15,7 +13,7 @@ import urllib.request
 import meshio
 import numpy as np
 import pytest
-from browser import CHROMIUM, FOUND, OPTIONS, needs_browser
+from browser import FOUND, browse
 from conftest import PROJECT, programs, shipped
 from scipy.spatial.transform import Rotation
 
@@ -308,15 +306,10 @@ def test_a_report_of_the_plan_is_written_where_it_is_wanted(served, tmp_path):
 
 def browsed(live, served, script, size):
     """Returns what a script finds in the page."""
-    needs_browser()
     server, address = served
     script = f"<script>{HELPERS}{script}{TOLD}</script></body>"
     server.page = live.page(server.scene).replace(b"</body>", script.encode())
-    with tempfile.TemporaryDirectory() as profile:
-        message = subprocess.run(
-            [CHROMIUM, *[one for one in OPTIONS if "NOTFOUND" not in one],
-             f"--user-data-dir={profile}", f"--window-size={size}", "--virtual-time-budget=60000",
-             "--dump-dom", address], capture_output=True, text=True, timeout=110).stdout
+    message = browse(address, "--virtual-time-budget=60000", "--dump-dom", size=size, seconds=110)
     found = json.loads(FOUND.search(message)[1].replace("&amp;", "&"))
     assert "error" not in found, found
     return found
@@ -331,7 +324,7 @@ def test_a_written_result_warns_of_what_its_summary_warns_of(served, monkeypatch
 
 
 def test_a_face_of_the_former_plan_is_marked_as_such(live, served):
-    found = browsed(live, served, FORMER, "1200,900")
+    found = browsed(live, served, FORMER, (1200, 900))
     first, typed, undone, preview = (found[name] for name in ("first", "typed", "undone", "preview"))
     assert first["kind"] == "exact" and "foremost" in first["measured"] and first["unit"] == "movement, mm"
     for former in (typed, found["missing"]):
@@ -348,7 +341,7 @@ def test_a_face_of_the_former_plan_is_marked_as_such(live, served):
 
 @pytest.mark.long
 def test_plan_a_and_the_handle_are_shown_where_they_belong(live, served):
-    found = browsed(live, served, VIEWS, "1200,900")
+    found = browsed(live, served, VIEWS, (1200, 900))
     assert found["early"] == [True, ["after", 1, 1]], "no plan A before the first answer"
     high, farthest = found["scale"]
     assert farthest > 3 and high >= farthest, "the scale reaches to plan A"
@@ -357,7 +350,7 @@ def test_plan_a_and_the_handle_are_shown_where_they_belong(live, served):
 
 
 def test_a_bone_is_dragged_and_the_face_follows(live, served):
-    found = browsed(live, served, SCRIPT, "390,844")
+    found = browsed(live, served, SCRIPT, (390, 844))
     assert found["pieces"] == ["mandible", "maxilla", "chin"] and 3 < found["first"] < 8
     assert found["during"] == "preview" and found["undone"]
     assert 0.5 < abs(found["dragged"]) < 2 and 0 < found["off"] < 0.5
