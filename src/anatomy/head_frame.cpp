@@ -155,7 +155,7 @@ Plane fit_plane(const surface::Surface& skull) {
                           many = thinned(skull.points, 40000);
   const MirrorFit coarse(tree, few, 10), fine(tree, more, 5), broad(tree, many, 5),
       finest(tree, many, 2);
-  std::vector<Fit> fits = best_of(first_planes(mean_of(few), coarse), 12);
+  std::vector<Fit> fits = best_of(first_planes(base::mean(few), coarse), 12);
   for (Fit& fit : fits) fit = refine(fit.plane, coarse);
   fits = best_of(std::move(fits), 3);
   for (Fit& fit : fits) fit = refine(fit.plane, fine);
@@ -179,7 +179,7 @@ std::array<Vec3, 2> symphysis_and_rami(const surface::Surface& mandible, const P
         "{}: has no point within {:g} mm of the skull's midsagittal plane; give surfaces of one "
         "head in one frame",
         mandible.name, near);
-  return {mean_of(symphysis), mean_of(rami)};
+  return {base::mean(symphysis), base::mean(rami)};
 }
 
 }  // namespace
@@ -202,7 +202,7 @@ HeadFrame fit_head_frame(const surface::Surface& skull, const surface::Surface& 
   const Plane plane = fit_plane(skull);
   const auto [symphysis, rami] = symphysis_and_rami(mandible, plane);
   const Vec3 way = plane.within(rami - symphysis).normalized(),
-             above = plane.within(mean_of(skull.points) - (symphysis + rami) / 2);
+             above = plane.within(base::mean(skull.points) - (symphysis + rami) / 2);
   Mat3 axes;
   axes.row(1) = way;
   axes.row(2) = (above - above.dot(way) * way).normalized();

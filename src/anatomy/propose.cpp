@@ -15,7 +15,7 @@ namespace {
 
 /// The largest distance, mm, of a point from the middle of all.
 double reach_of(const surface::Surface& part) {
-  const Vec3 middle = mean_of(part.points);
+  const Vec3 middle = base::mean(part.points);
   double reach = 0;
   for (const Vec3& p : part.points) reach = std::max(reach, (p - middle).norm());
   return reach;
@@ -38,7 +38,7 @@ void require_head(const surface::Surface& skin, const surface::Surface& skull,
         "{}: reaches {:.3g} mm from its middle, a mandible {:g} to {:g} mm; surfaces must be in mm",
         mandible.name, reach, min_reach, max_reach);
   constexpr double beside = 30;  // mm
-  const Vec3 jaw = mean_of(mandible.points);
+  const Vec3 jaw = base::mean(mandible.points);
   const Eigen::AlignedBox3d box = surface::bounding_box(skin.points);
   if (((jaw - box.min()).array() < -beside).any() || ((box.max() - jaw).array() < -beside).any())
     base::refuse("{}: the mandible {} lies outside of it; give surfaces of one head in one frame",

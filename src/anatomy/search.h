@@ -11,12 +11,6 @@
 
 namespace repose::anatomy {
 
-inline Vec3 mean_of(const std::vector<Vec3>& points) {
-  Vec3 sum = Vec3::Zero();
-  for (const Vec3& p : points) sum += p;
-  return sum / static_cast<double>(points.size());
-}
-
 /// A search for landmarks: what is known so far, in one head frame.
 class Search {
  public:

@@ -4,15 +4,12 @@
 #include <cmath>
 
 namespace repose::base {
-namespace {
 
 Vec3 mean(std::span<const Vec3> points) {
   Vec3 sum = Vec3::Zero();
   for (const Vec3& point : points) sum += point;
   return sum / static_cast<double>(points.size());
 }
-
-}  // namespace
 
 Mat4 Similarity::matrix() const {
   Mat4 matrix = Mat4::Identity();

@@ -95,6 +95,9 @@ struct Similarity {
   Similarity after(const Similarity& first) const;
 };
 
+/// Returns the mean of at least one point.
+Vec3 mean(std::span<const Vec3> points);
+
 enum class Handedness { kept, mirrored };
 
 /// The least-squares transform taking `moving` to `fixed`, pairs in order (Umeyama, Least-squares
