@@ -57,6 +57,13 @@ std::string expected_number(bool whole, std::string_view unit, const Range& rang
   return result;
 }
 
+std::string trimmed(std::string_view text) {
+  constexpr const char* blanks = " \t\r\n\v\f";
+  const size_t begin = text.find_first_not_of(blanks);
+  if (begin == std::string_view::npos) return "";
+  return std::string(text.substr(begin, text.find_last_not_of(blanks) - begin + 1));
+}
+
 std::string lower(std::string_view text) {
   std::string lowered(text);
   for (char& c : lowered)

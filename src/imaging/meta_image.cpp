@@ -22,17 +22,9 @@ struct MetaHeader {
   int64_t bytes = 0;    ///< of the header, up to what follows it
 };
 
-/// A text without blanks and line ends around it.
-std::string stripped(const std::string& text) {
-  constexpr const char* blanks = " \t\r\n\v\f";
-  const size_t begin = text.find_first_not_of(blanks);
-  if (begin == std::string::npos) return "";
-  return text.substr(begin, text.find_last_not_of(blanks) - begin + 1);
-}
-
 /// Returns the text behind a key. ITK takes ':' for '=', and several of them for one.
 std::string value_behind(const std::string& text) {
-  return stripped(text.substr(std::min(text.find_first_not_of(" \t:="), text.size())));
+  return base::trimmed(text.substr(std::min(text.find_first_not_of(" \t:="), text.size())));
 }
 
 MetaHeader meta_header(const std::filesystem::path& file) {
@@ -41,7 +33,7 @@ MetaHeader meta_header(const std::filesystem::path& file) {
   for (std::string line; std::getline(in, line);) {
     const size_t separator = line.find_first_of("=:");
     if (separator == std::string::npos) continue;
-    const std::string key = stripped(line.substr(0, separator));
+    const std::string key = base::trimmed(line.substr(0, separator));
     const std::string value = value_behind(line.substr(separator));
     if (key == "CompressedData") header.compressed = base::lower(value) == "true";
     if (key == "HeaderSize") header.skipped = base::parse_integer(value).value_or(0);
@@ -92,7 +84,8 @@ void check_list(const std::filesystem::path& file, const MetaHeader& header, con
   std::ifstream in(file, std::ios::binary);
   in.seekg(header.bytes);
   for (std::string line; static_cast<int64_t>(names.size()) <= count && std::getline(in, line);)
-    if (const std::string name = stripped(line); !in.eof() && !name.empty()) names.push_back(name);
+    if (const std::string name = base::trimmed(line); !in.eof() && !name.empty())
+      names.push_back(name);
   check_count(file, static_cast<int64_t>(names.size()), count);
   for (const std::string& name : names) check_data(file, header, name, image.bytes / count);
 }
@@ -159,7 +152,7 @@ void check_size(const std::filesystem::path& file, const std::string& value) {
   for (const std::string_view word : base::words(value))
     if (const auto number = base::parse_number(word); number && !(*number >= 1))
       base::refuse("{}: its DimSize is {}; each number must be ≥ 1; mend the header", file.string(),
-                   base::quote(stripped(value)));
+                   base::quote(base::trimmed(value)));
 }
 
 /// ITK formats the name with sprintf, into a buffer of fixed size, for each of several files.

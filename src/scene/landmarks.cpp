@@ -129,12 +129,6 @@ std::vector<Landmark> read_markups(const std::string& file, const std::string& t
 
 // --- .fcsv and .csv
 
-std::string trimmed(const std::string& text) {
-  const size_t begin = text.find_first_not_of(" \t\r");
-  if (begin == std::string::npos) return "";
-  return text.substr(begin, text.find_last_not_of(" \t\r") + 1 - begin);
-}
-
 /// The fields of a line; a comma inside quotes does not part them.
 std::vector<std::string> fields(const std::string& line) {
   std::vector<std::string> found(1);
@@ -147,7 +141,7 @@ std::vector<std::string> fields(const std::string& line) {
     else
       found.back() += c;
   }
-  for (std::string& field : found) field = trimmed(field);
+  for (std::string& field : found) field = base::trimmed(field);
   return found;
 }
 
@@ -165,7 +159,7 @@ class Table {
     std::string line;
     for (size_t number = 1; std::getline(stream, line); ++number) {
       const std::string place = fmt::format("{}:{}", file_, number);
-      line = trimmed(line);
+      line = base::trimmed(line);
       if (line.empty()) continue;
       if (line[0] == '#')
         take_comment(place, line);
@@ -179,8 +173,8 @@ class Table {
   void take_comment(const std::string& place, const std::string& line) {
     const size_t equals = line.find('=');
     if (equals == std::string::npos) return;
-    const std::string key = trimmed(line.substr(1, equals - 1));
-    const std::string value = trimmed(line.substr(equals + 1));
+    const std::string key = base::trimmed(line.substr(1, equals - 1));
+    const std::string value = base::trimmed(line.substr(equals + 1));
     if (key == "CoordinateSystem") frame_ = frame_of(place, value);
     if (key != "columns" || !fcsv_) return;
     const auto names = fields(value);

@@ -30,6 +30,9 @@ std::string without_ending(std::string_view name, const std::vector<std::string>
 /// The next line from `position` on, without its end (LF, CRLF or CR), which is stepped over.
 std::string_view next_line(std::string_view text, size_t& position);
 
+/// `text` without blanks and line ends around it.
+std::string trimmed(std::string_view text);
+
 /// The blank-separated words of a line.
 std::vector<std::string_view> words(std::string_view line);
 

@@ -23,6 +23,11 @@ TEST(Text, WholeNumbers) {
     EXPECT_FALSE(parse_integer(bad)) << bad;
 }
 
+TEST(Text, TrimmedOfBlanksAroundIt) {
+  EXPECT_EQ(trimmed(" \t a b\r\n"), "a b");
+  EXPECT_EQ(trimmed(" \n"), "");
+}
+
 TEST(Text, ShownIsOneShortLine) {
   EXPECT_EQ(quote("a\nb\tc"), "'a?b?c'");
   EXPECT_EQ(quote(std::string(1000, 'x')), "'" + std::string(60, 'x') + "...'");
