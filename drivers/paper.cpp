@@ -9,13 +9,11 @@
 /// forward.h5 and turned.h5. Serial. Exit status: 0 done, 1 bad input, 3 internal error.
 #include <cstdio>
 #include <filesystem>
-#include <sstream>
 
 #include "paper/figures.h"
 #include "paper/page.h"
 #include "repose/base/agreement.h"
 #include "repose/base/program.h"
-#include "repose/base/text.h"
 #include "repose/base/whole_file.h"
 
 namespace {
@@ -38,19 +36,6 @@ std::vector<base::Option> option_table() {
           {"path_seconds", OptionKind::number, "12", "The same of our default.",
            base::Range::between(1e-3, 1e6), "s"},
           {"images", OptionKind::text, "paper_", "What the page's pictures' names begin with."}};
-}
-
-std::vector<int> read_layers(const std::string& text) {
-  std::vector<int> layers;
-  std::istringstream words(text);
-  for (std::string word; std::getline(words, word, ',');) {
-    const auto number = base::parse_integer(word);
-    if (!number || *number < 2 || *number > 64)
-      base::refuse("-layers {}: {} is not a number of layers, 2 … 64", text, base::quote(word));
-    layers.push_back(static_cast<int>(*number));
-  }
-  if (layers.empty()) base::refuse("-layers: give numbers of layers, such as 2,4,6");
-  return layers;
 }
 
 /// Figs. 5 and 7 are drawn from results of the shipped scenes.
@@ -83,11 +68,12 @@ base::Exit run(const base::Options& options) {
                                            ? std::filesystem::path(options.text("meshes"))
                                            : base::shipped_folder("meshes");
   const paper::Plan plan{.scene = scene::read_scene(meshes / "paper_jaw_advance.yaml"),
-                         .layers = read_layers(options.text("layers")),
+                         .layers = options.integers("layers", base::Range::between(2, 64)),
                          .rules = {.accuracy = options.number("accuracy"),
                                    .limit = options.integer("limit"),
                                    .path_seconds = options.number("path_seconds"),
                                    .seconds = options.number("seconds")}};
+  if (plan.layers.empty()) base::refuse("-layers: give numbers of layers, such as 2,4,6");
   std::error_code error;
   std::filesystem::create_directories(folder, error);
   if (error)

@@ -11,10 +11,8 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <cmath>
 #include <cstdio>
 #include <filesystem>
-#include <sstream>
 
 #include "repose/base/agreement.h"
 #include "repose/base/log.h"
@@ -52,41 +50,9 @@ std::vector<base::Option> option_table() {
        "s"}};
 }
 
-std::vector<std::string> words_of(const base::Options& options, const char* name) {
-  std::vector<std::string> words;
-  std::istringstream list(options.text(name));
-  for (std::string word; std::getline(list, word, ',');)
-    if (!word.empty()) words.push_back(word);
-  return words;
-}
-
-std::vector<double> numbers_of(const base::Options& options, const char* name,
-                               const base::Range& range) {
-  std::vector<double> numbers;
-  for (const std::string& word : words_of(options, name)) {
-    const auto number = base::parse_number(word);
-    if (!number || !range.contains(*number))
-      base::refuse("-{} {}: {} is not a number, {}", name, options.text(name), base::quote(word),
-                   range.text());
-    numbers.push_back(*number);
-  }
-  return numbers;
-}
-
-std::vector<int> integers_of(const base::Options& options, const char* name,
-                             const base::Range& range) {
-  std::vector<int> integers;
-  for (const double number : numbers_of(options, name, range)) {
-    if (number != std::floor(number))
-      base::refuse("-{} {}: {:g} is not a whole number", name, options.text(name), number);
-    integers.push_back(static_cast<int>(number));
-  }
-  return integers;
-}
-
 std::vector<std::string> choices_of(const base::Options& options, const char* name,
                                     const std::vector<std::string>& allowed) {
-  const std::vector<std::string> chosen = words_of(options, name);
+  const std::vector<std::string> chosen = options.words(name);
   for (const std::string& word : chosen)
     if (std::find(allowed.begin(), allowed.end(), word) == allowed.end())
       base::refuse("-{} {}: {} is not one of {}", name, options.text(name), base::quote(word),
@@ -98,14 +64,14 @@ tradeoff::Plan read_plan(const base::Options& options) {
   using base::Range;
   tradeoff::Plan plan;
   plan.methods = choices_of(options, "methods", {"ntr", "nls", "lmvm", "cg", "bnls", "bntr"});
-  plan.accuracies = numbers_of(options, "accuracies", Range::between(1e-12, 100));
+  plan.accuracies = options.numbers("accuracies", Range::between(1e-12, 100));
   const std::vector<std::string> volumes = {"none", "paper", "penalty"};  // as they are numbered
   for (const std::string& word : choices_of(options, "volumes", volumes))
     plan.volumes.push_back(static_cast<scene::VolumeTerm>(
         std::find(volumes.begin(), volumes.end(), word) - volumes.begin()));
-  plan.load_steps = integers_of(options, "load_steps", Range::between(1, 100000));
-  plan.layers = integers_of(options, "layers", Range::between(2, 64));
-  if (options.has("edges")) plan.edges = numbers_of(options, "edges", Range::between(0.1, 100));
+  plan.load_steps = options.integers("load_steps", Range::between(1, 100000));
+  plan.layers = options.integers("layers", Range::between(2, 64));
+  if (options.has("edges")) plan.edges = options.numbers("edges", Range::between(0.1, 100));
   plan.reference_accuracy = options.number("reference");
   plan.seconds = options.number("time_limit");
   if (plan.methods.empty()) base::refuse("-methods: give one or more");

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <sstream>
@@ -411,6 +412,36 @@ double Options::number(std::string_view name) const {
 int64_t Options::integer(std::string_view name) const {
   if (const auto value = parse_integer(text(name))) return *value;
   throw InternalError(fmt::format("{}: -{} holds no whole number", program_, name));
+}
+
+std::vector<std::string> Options::words(std::string_view name) const {
+  std::vector<std::string> result;
+  std::istringstream list(text(name));
+  for (std::string word; std::getline(list, word, ',');)
+    if (!word.empty()) result.push_back(word);
+  return result;
+}
+
+std::vector<double> Options::numbers(std::string_view name, const Range& range) const {
+  std::vector<double> result;
+  for (const std::string& word : words(name)) {
+    const auto number = parse_number(word);
+    if (!number || !range.contains(*number))
+      refuse("-{} {}: {} is not {}", name, text(name), quote(word),
+             expected_number(false, "", range, {}));
+    result.push_back(*number);
+  }
+  return result;
+}
+
+std::vector<int> Options::integers(std::string_view name, const Range& range) const {
+  std::vector<int> result;
+  for (const double number : numbers(name, range)) {
+    if (number != std::floor(number))
+      refuse("-{} {}: {:g} is not a whole number", name, text(name), number);
+    result.push_back(static_cast<int>(number));
+  }
+  return result;
 }
 
 std::vector<std::string> Options::unused() const {

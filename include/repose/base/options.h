@@ -85,6 +85,11 @@ class Options {
   bool flag(std::string_view name) const;
   std::string text(std::string_view name) const;  ///< text, path, choice; a number as typed
   std::vector<std::string> texts(std::string_view name) const;  ///< all values; empty if none
+  /// The words of a text between its commas, and as numbers. InputError for one that is none or out
+  /// of range.
+  std::vector<std::string> words(std::string_view name) const;
+  std::vector<double> numbers(std::string_view name, const Range& range) const;
+  std::vector<int> integers(std::string_view name, const Range& range) const;
 
   /// The PETSc options of the command line, and the unknown ones of PETSC_OPTIONS, that nobody
   /// requested. PETSc must be initialized.

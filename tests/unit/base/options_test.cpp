@@ -206,6 +206,18 @@ struct Bad {
   std::string expected;
 };
 
+TEST(Options, ReadsListsOfNumbers) {
+  Line line({"head.yaml", "-output", "2,,4"});
+  line->check();
+  EXPECT_EQ(line->words("output"), (std::vector<std::string>{"2", "4"}));
+  EXPECT_EQ(line->integers("output", Range::between(2, 4)), (std::vector<int>{2, 4}));
+  for (const char* bad : {"2,x", "5", "2.5"}) {
+    Line refused({"head.yaml", "-output", bad});
+    refused->check();
+    EXPECT_THROW(refused->integers("output", Range::between(2, 4)), InputError) << bad;
+  }
+}
+
 TEST(Options, RefusesInOneLine) {
   const std::vector<Bad> cases{
       {{"a", "-acuracy", "1"},
