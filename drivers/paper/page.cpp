@@ -1,8 +1,6 @@
 #include "page.h"
 
-#include <unistd.h>
-
-#include <thread>
+#include "repose/base/program.h"
 
 namespace repose::paper {
 
@@ -14,12 +12,6 @@ struct Printed {
 };
 constexpr Printed printed_sizes[] = {
     {2, 954, 5881, 1748}, {4, 1908, 14941, 2622}, {6, 2862, 24001, 4370}};
-
-std::string machine() {
-  const double memory = static_cast<double>(sysconf(_SC_PHYS_PAGES)) *
-                        static_cast<double>(sysconf(_SC_PAGESIZE)) / (1 << 30);
-  return fmt::format("{} cores, {:.0f} GiB of memory", std::thread::hardware_concurrency(), memory);
-}
 
 std::string beside_printed(int64_t ours, int layers, int Printed::*what) {
   for (const Printed& p : printed_sizes)
@@ -162,7 +154,7 @@ std::string page(const Findings& findings, const std::string& command, const std
              "springs of 1 N/mm,\ns_ref = 1 mm, the lower jaw 6 mm forward).\n\n"
              "Made by `{}` in one run, on one core of a machine with {};\n"
              "pictures by `drivers/plot_paper.py`. Times vary by machine and by run.\n\n",
-             findings.plan.scene.file.filename().string(), command, machine()) +
+             findings.plan.scene.file.filename().string(), command, base::machine()) +
          size_table(findings) + run_tables(findings) + motion_table(findings) + claims(findings) +
          figures(images);
 }

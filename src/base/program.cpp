@@ -3,6 +3,7 @@
 #include <hdf5.h>
 #include <malloc.h>
 #include <sys/resource.h>
+#include <unistd.h>
 #include <cstdio>
 #include <ctime>
 #include <fstream>
@@ -116,6 +117,12 @@ double heap_bytes() {
 }
 
 double cpu_seconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
+
+std::string machine() {
+  const double memory = static_cast<double>(sysconf(_SC_PHYS_PAGES)) *
+                        static_cast<double>(sysconf(_SC_PAGESIZE)) / (1 << 30);
+  return fmt::format("{} cores, {:.0f} GiB of memory", std::thread::hardware_concurrency(), memory);
+}
 
 namespace {
 

@@ -2,12 +2,9 @@
 /// to 1e6 points, in one run, and writes the table of costs per point. One core; a few minutes;
 /// wants 6 GB of memory:
 ///     benchmark_scaling docs/measurements/scaling.md
-#include <unistd.h>
-
 #include <algorithm>
 #include <cstdio>
 #include <functional>
-#include <thread>
 
 #include "repose/base/petsc.h"
 #include "repose/base/program.h"
@@ -108,12 +105,6 @@ std::string row(const Cost& cost, const Cost& reference) {
          cell(&Cost::model_bytes, 1) + cell(&Cost::solver_bytes, 1) + "\n";
 }
 
-std::string machine() {
-  const double memory = static_cast<double>(sysconf(_SC_PHYS_PAGES)) *
-                        static_cast<double>(sysconf(_SC_PAGESIZE)) / (1 << 30);
-  return fmt::format("{} cores, {:.0f} GiB of memory", std::thread::hardware_concurrency(), memory);
-}
-
 std::string page(const std::vector<Cost>& costs) {
   std::string text = fmt::format(
       "# Scaling: cost per point from 2e3 to 1e6 points\n\n"
@@ -130,7 +121,7 @@ std::string page(const std::vector<Cost>& costs) {
       "| points | springs | prisms | build, µs/point | evaluation, µs/point |"
       " preconditioner, µs/point | iteration, µs/point | model, B/point | solver, B/point |\n"
       "|--:|--:|--:|--:|--:|--:|--:|--:|--:|\n",
-      machine(), layers, bone_edge);
+      base::machine(), layers, bone_edge);
   for (const Cost& cost : costs) text += row(cost, costs[costs.size() - 2]);
   return text;
 }

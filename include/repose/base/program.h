@@ -28,6 +28,9 @@ double heap_bytes();
 /// CPU time of this process so far, s.
 double cpu_seconds();
 
+/// Returns the number of cores and the memory of this machine, in words.
+std::string machine();
+
 /// Returns the provenance of a result as (name, text): "program" with its version, "command" as
 /// it was typed (where the system tells), "ranks", "libraries" with their versions. Not collective;
 /// PETSc must be initialized.
