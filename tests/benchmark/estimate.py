@@ -35,6 +35,7 @@ except ImportError:
 
 import measure
 from page import PROJECT, option_parser, write
+from sheet.whole_file import Target, write_figure  # page knows where it is
 from tissue import apart, last, steps
 
 KNOWN = 1e-9  # mm: how well rest positions are known
@@ -312,12 +313,6 @@ def listed(runs, left_out):
     return text
 
 
-def save(figure, file):
-    figure.savefig(f"{file}.part", format="png", dpi=110, bbox_inches="tight")
-    os.replace(f"{file}.part", file)
-    plt.close(figure)
-
-
 def draw(runs, file):
     """Draws a histogram of ratios, and the estimate over the error of each run."""
     shown = [run for run in runs if np.isfinite(run.estimate) and run.error > KNOWN
@@ -343,7 +338,7 @@ def draw(runs, file):
     right.set_xlabel("true error, mm (crosses: interrupted)")
     right.set_ylabel("estimate, mm")
     right.legend(fontsize=7)
-    save(figure, file)
+    write_figure(figure, Target(file, ".png"))
 
 
 def page(runs, weak, study, seconds, picture):

@@ -29,7 +29,8 @@ from measure import run
 from page import option_parser, print_table
 from phantom_heads import Shape, write_surfaces
 from heads import BONES, DATA  # page knows where it is
-from sheet.published import PUBLISHED  # page knows where it is
+from sheet.landmarks import read_landmarks  # page knows where it is
+from sheet.published import PUBLISHED
 from tissue import last, model_of
 
 # Operation → bone, template, clinical move and mm.
@@ -80,8 +81,7 @@ def landmarks_of(options, folder):
                 folder / "head"], folder, ends=None)
     if done.status != 0:
         raise SystemExit(done.error or done.text)
-    markup, = json.loads((folder / "head.mrk.json").read_text())["markups"]
-    return {point["label"]: np.array(point["position"]) for point in markup["controlPoints"]}
+    return read_landmarks(folder / "head.mrk.json")
 
 
 def make_variant(options, folder, name):

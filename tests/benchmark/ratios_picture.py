@@ -11,12 +11,12 @@ teeth, as in the vestibule, is supported elastically or free ends in blue. Needs
 draws.
 """
 
-import json
 import pathlib
 import sys
 
 sys.path.append(str(pathlib.Path(__file__).resolve().parents[2] / "drivers"))
 import render  # noqa: E402
+from sheet.landmarks import read_landmarks  # noqa: E402
 
 render.find_screen()
 render.load_modules()
@@ -26,11 +26,6 @@ WIDTH = 250  # pixels of a view
 HALF = 38  # mm from the middle of a view to its border
 HELD, FREE = (0.80, 0.10, 0.10), (0.10, 0.30, 0.85)
 WEDGE_ENDS = (0, 2, 1, 3, 5, 4)  # VTK's wedge has its first triangle the other way round
-
-
-def landmarks_of(file):
-    markup, = json.loads(file.read_text())["markups"]
-    return {point["label"]: np.array(point["position"]) for point in markup["controlPoints"]}
 
 
 def wedges(points, prisms):
@@ -130,7 +125,7 @@ def picture(file, landmarks, output):
 def main():
     folder, out = map(pathlib.Path, sys.argv[1:3])
     way = "_".join(sys.argv[3:] or ["default"])
-    landmarks = landmarks_of(folder / "head.mrk.json")
+    landmarks = read_landmarks(folder / "head.mrk.json")
     out.mkdir(exist_ok=True)
     for file in sorted(folder.glob(f"*_{way}.h5")):
         picture(file, landmarks, out / f"{file.stem.removesuffix('_' + way)}.png")
