@@ -71,11 +71,7 @@ void count_self_intersections(const Surface& surface, const std::vector<int64_t>
   Surface welded = surface;
   for (auto& triangle : welded.triangles)
     for (auto& vertex : triangle) vertex = first[vertex];
-  const auto pairs = self_intersections(welded);
-  d.self_intersections = static_cast<int64_t>(pairs.size());
-  if (pairs.empty()) return;
-  d.first_self_intersection[0] = pairs.front().first;
-  d.first_self_intersection[1] = pairs.front().second;
+  d.self_intersections = static_cast<int64_t>(self_intersections(welded).size());
 }
 
 }  // namespace

@@ -164,8 +164,8 @@ int64_t TriangleTree::any_within(const Vec3& query, double limit, int64_t hint) 
   return found;
 }
 
-double TriangleTree::min_max(std::span<const Vec3> points, double limit, double enough) const {
-  double best = limit;
+double TriangleTree::min_max(std::span<const Vec3> points, double enough) const {
+  double best = std::numeric_limits<double>::infinity();
   const auto to_box = [&](const Node& node) {
     double greatest = 0;
     for (const Vec3& point : points)

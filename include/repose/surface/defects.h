@@ -23,7 +23,6 @@ struct Defects {
   int64_t degenerate_triangles = 0;   ///< zero area or a repeated vertex
   int64_t first_non_manifold_edge[2] = {-1, -1};  ///< its vertices, −1 for none
   int64_t first_non_manifold_vertex = -1;         ///< −1 for none
-  int64_t first_self_intersection[2] = {-1, -1};  ///< its triangles, −1 for none
   bool outward = false;                           ///< closed and bounding a positive volume
 };
 

@@ -68,9 +68,9 @@ class TriangleTree {
   /// A triangle within √limit of the point, −1 for none. `hint` is tried first.
   int64_t any_within(const Vec3& query, double limit, int64_t hint = -1) const;
 
-  /// Returns the least of all triangles of the max over `points` of the squared distance to it, if
-  /// below `limit` (`limit` otherwise); stops at the first one that is at most `enough`.
-  double min_max(std::span<const Vec3> points, double limit, double enough) const;
+  /// Returns the least of all triangles of the max over `points` of the squared distance to it;
+  /// stops at the first one that is at most `enough`.
+  double min_max(std::span<const Vec3> points, double enough) const;
 
   /// Returns whether all points lie within √limit of one and the same triangle. `hint` is tried
   /// first and receives that triangle.

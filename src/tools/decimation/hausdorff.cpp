@@ -30,7 +30,7 @@ class Search {
     while (!pieces_.empty() && pieces_.top().upper > lower_ + accuracy_ && refined++ < max_pieces)
       refine();
     const double upper = pieces_.empty() ? 0 : pieces_.top().upper;
-    return {lower_, std::max({upper, lower_, dropped_}), worst_, upper <= lower_ + accuracy_};
+    return {lower_, std::max({upper, lower_, dropped_})};
   }
 
  private:
@@ -60,14 +60,12 @@ class Search {
   void see(const Vec3& point) {
     if (tree_.any_within(point, lower_ * lower_) >= 0) return;
     lower_ = std::sqrt(tree_.nearest(point).squared);
-    worst_ = point;
   }
 
   /// Pieces that cannot matter are not kept.
   void offer(const Piece& piece) {
     const double enough = lower_ + 0.5 * accuracy_;
-    const double upper = std::sqrt(
-        tree_.min_max(piece.corners(), std::numeric_limits<double>::infinity(), enough * enough));
+    const double upper = std::sqrt(tree_.min_max(piece.corners(), enough * enough));
     if (upper <= enough)
       dropped_ = std::max(dropped_, upper);
     else
@@ -77,7 +75,6 @@ class Search {
   const Surface& from_;
   TriangleTree tree_;
   double accuracy_, lower_ = 0, dropped_ = 0;
-  Vec3 worst_ = Vec3::Zero();
   std::priority_queue<Bounded> pieces_;
   std::vector<Piece> parts_;
 };

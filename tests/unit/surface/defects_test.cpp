@@ -71,10 +71,8 @@ TEST(Defects, a_bow_tie_is_a_non_manifold_vertex_and_two_components) {
 
 TEST(Defects, crossing_triangles_are_counted_in_pairs) {
   Surface s = both(patch(1), {"", {{1, 5, -5}, {2, 5, -5}, {1, 5, 5}}, {{0, 1, 2}}});
-  Defects d = inspect(s);
-  EXPECT_EQ(d.self_intersections, 1);
-  EXPECT_EQ(d.first_self_intersection[0], 1);
-  EXPECT_EQ(d.first_self_intersection[1], 2);
+  EXPECT_EQ(inspect(s).self_intersections, 1);
+  EXPECT_EQ(self_intersections(s).front(), std::pair(int64_t{1}, int64_t{2}));
   s.points[5].x() = 9;
   EXPECT_EQ(inspect(s).self_intersections, 2);
   EXPECT_EQ(inspect(s, false).self_intersections, 0);

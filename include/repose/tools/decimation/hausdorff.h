@@ -7,10 +7,8 @@ using surface::Surface;
 
 /// A distance enclosed between two numbers, mm.
 struct DistanceBounds {
-  double lower;         ///< reached at `worst`, to rounding
-  double upper;         ///< proven, rounding included
-  Vec3 worst;           ///< the point of the first surface found farthest from the second
-  bool settled = true;  ///< upper − lower ≤ the accuracy requested
+  double lower;  ///< reached at a point of the first surface, to rounding
+  double upper;  ///< proven, rounding included
 };
 
 /// The one-sided Hausdorff distance max_{p∈from} min_{q∈to} |p − q| of triangle surfaces, each with
