@@ -9,6 +9,7 @@
 
 #include "level_cut.h"
 #include "repose/base/error.h"
+#include "repose/imaging/outer_skin.h"
 #include "repose/imaging/taubin.h"
 #include "repose/meshtools/remesh.h"
 #include "repose/surface/component.h"
@@ -24,6 +25,7 @@ namespace {
 constexpr double beside_cap = 6;         // mm, from the skin to the end of a scan
 constexpr double border_smoothing = 21;  // mm², rounds times squared edges
 constexpr double coarsest_sampling = 3, sampling_per_edge = 0.75;  // mm, of the outer skin
+constexpr double tolerance = 3;  // mm from the face to what it is fitted to
 constexpr int fits = 4;
 constexpr int relaxations = 20;
 constexpr double thin = 0.93;   // cosine of an angle that is widened, 21.6°
@@ -34,7 +36,7 @@ VertexNeighbors neighbors_of(const Surface& surface) {
   return {EdgeTable(surface.triangles), surface.points.size()};
 }
 
-/// mm along edges from the vertices within `near` of the bones, but for those at a scan's end.
+/// mm along edges from the vertices within face_near of the bones, but for those at a scan's end.
 std::vector<double> path_length_from_bones(const Surface& skin, const VertexNeighbors& neighbors,
                                            const std::vector<char>& end,
                                            const FaceRequest& request) {
@@ -48,11 +50,11 @@ std::vector<double> path_length_from_bones(const Surface& skin, const VertexNeig
   };
   for (size_t v = 0; v < length_to.size(); ++v)
     for (const Vec3& place : request.places)
-      if ((skin.points[v] - place).norm() <= request.near) offer(static_cast<int64_t>(v), 0);
+      if ((skin.points[v] - place).norm() <= face_near) offer(static_cast<int64_t>(v), 0);
   for (const Surface& bone : request.beneath) {
     const TriangleTree tree(bone);
     for (size_t v = 0; v < length_to.size(); ++v)
-      if (tree.any_within(skin.points[v], request.near * request.near) >= 0)
+      if (tree.any_within(skin.points[v], face_near * face_near) >= 0)
         offer(static_cast<int64_t>(v), 0);
   }
   while (!front.empty()) {
@@ -158,12 +160,12 @@ Surface region_of(const OuterSkin& outer, const Surface& given, const FaceReques
     base::refuse(
         "{}: nothing of it is within {:g} mm of a bone that moves; check that skin and "
         "bones come from one scan and in one frame",
-        outer.skin.name, request.near);
+        outer.skin.name, face_near);
   return largest_component(part);
 }
 
 /// The given triangles near the face: no point of the others is within the tolerance of it.
-Surface part_near(const Surface& given, const TriangleTree& face, double tolerance) {
+Surface part_near(const Surface& given, const TriangleTree& face) {
   Surface part{given.name, given.points, {}};
   for (const Triangle& triangle : given.triangles) {
     const Corners at = corners(given, triangle);
@@ -176,8 +178,8 @@ Surface part_near(const Surface& given, const TriangleTree& face, double toleran
 
 /// Draws the vertices along their normals to the samples within the tolerance, which are nearest to
 /// the triangles `nearest` (when last looked for, -1 at first).
-void fit(const Samples& samples, double tolerance, const VertexNeighbors& neighbors,
-         std::vector<int64_t>& nearest, Surface& face) {
+void fit(const Samples& samples, const VertexNeighbors& neighbors, std::vector<int64_t>& nearest,
+         Surface& face) {
   const TriangleTree tree(face);
   const std::vector<Vec3> normals = vertex_normals(face);
   std::vector<double> offset(face.points.size(), 0), weight(face.points.size(), 0);
@@ -291,18 +293,17 @@ void count_openings(const OuterSkin& outer, Face& face) {
 
 Face solvable_face(const Surface& given, const FaceRequest& request) {
   Face face;
-  Rolling rolling = request.rolling;
+  Rolling rolling;
   rolling.sampling = std::min(coarsest_sampling, sampling_per_edge * request.edge);
   const OuterSkin outer = outer_skin(given, rolling);
   face.skin = remesh(region_of(outer, given, request), request.edge);
   count_openings(outer, face);
   const VertexNeighbors neighbors = neighbors_of(face.skin);
   widen_angles(neighbors, face.skin);
-  const Surface near = part_near(given, TriangleTree(face.skin), request.tolerance);
+  const Surface near = part_near(given, TriangleTree(face.skin));
   const Samples samples = sample(near, request.edge / 2);
   std::vector<int64_t> nearest(samples.point.size(), -1);
-  for (int round = 0; round < fits; ++round)
-    fit(samples, request.tolerance, neighbors, nearest, face.skin);
+  for (int round = 0; round < fits; ++round) fit(samples, neighbors, nearest, face.skin);
   unfold(neighbors, face.skin);
   measure(near, face);
   face.skin.name = given.name;

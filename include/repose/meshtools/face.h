@@ -1,12 +1,14 @@
 #pragma once
 #include <functional>
 
-#include "repose/imaging/outer_skin.h"
+#include "repose/surface/surface.h"
 
 namespace repose::meshtools {
 
-using imaging::Rolling;
 using surface::Surface;
+
+/// Skin within this distance of bones and places is taken, mm, straight.
+constexpr double face_near = 25;
 
 /// Request for the part of a given skin that is solved, and for its mesh.
 struct FaceRequest {
@@ -14,10 +16,7 @@ struct FaceRequest {
   std::vector<std::function<bool(const Vec3&)>> regions{};  ///< the skin in these is taken
   std::vector<Surface> beneath{};  ///< without any, that near these (moved bones) …
   std::vector<Vec3> places{};      ///< … and these; where there are none either, all of it
-  double near = 25;                ///< mm from them, straight
-  double margin = 35;              ///< mm further along the skin
-  double tolerance = 3;  ///< mm: what of the given skin is farther off (ears) is passed over
-  Rolling rolling{};
+  double margin = 35;              ///< mm along the skin beyond face_near
 };
 
 struct Face {
@@ -32,8 +31,8 @@ struct Face {
 /// over the bones that move and a margin, without the scan's ends, with no hole in it but the
 /// openings of the given skin that are as large as a mouth, remeshed, its angles below 22° widened
 /// where that can be, and then drawn along its normals to the given triangles, whose offsets within
-/// the tolerance are averaged over an edge, so that noise is not followed. Throws InputError if no
-/// outer skin is in the regions or near the bones.
+/// 3 mm are averaged over an edge, so that noise is not followed; what is farther off (ears) is
+/// passed over. Throws InputError if no outer skin is in the regions or near the bones.
 Face solvable_face(const Surface& given, const FaceRequest& request);
 
 /// An edge for a head of this size, mm: a seventieth of the surface's bounding diagonal, 2 to 8.

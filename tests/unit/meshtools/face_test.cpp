@@ -10,6 +10,7 @@
 #include "../surface/shapes.h"
 #include "imaging/distance_volume.h"
 #include "repose/imaging/isosurface.h"
+#include "repose/imaging/outer_skin.h"
 #include "repose/meshtools/signed_distance.h"
 #include "repose/surface/defects.h"
 #include "repose/surface/distance.h"
@@ -142,7 +143,7 @@ TEST(SolvableFace, lies_on_the_given_skin_and_is_well_shaped) {
       EXPECT_NEAR(x.norm(), radius, 0.25 + noise);
       farthest = std::max(farthest, radius * angle_from(request.places[0], x));
     }
-    EXPECT_NEAR(farthest, request.near + request.margin, 6);  // 25 mm straight, 35 mm along
+    EXPECT_NEAR(farthest, face_near + request.margin, 6);  // 25 mm straight, 35 mm along
   }
 }
 
