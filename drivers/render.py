@@ -34,7 +34,7 @@ import shutil
 import sys
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from sheet import RAMP, rounded_up  # noqa: E402
+from sheet import RAMP, REGION, rounded_up  # noqa: E402
 from sheet.script import (Arguments, Unusable, has_display, number_from, own_names, reading, refuse,  # noqa: E402
                           refuse_missing, result_name, run)
 from sheet.whole_file import Target  # noqa: E402
@@ -53,7 +53,6 @@ COLUMN, TITLE, BAR, TEXT = 480, 64, 110, 34  # pixels
 SUPER = 2  # pixels drawn for one of the picture, along each axis
 SKIN, IVORY, INK = (0.87, 0.68, 0.58), (0.96, 0.92, 0.80), (0.15, 0.15, 0.15)
 FLESH, GREY, STEEL = (0.70, 0.36, 0.33), (0.72, 0.74, 0.78), (0.45, 0.55, 0.65)
-REGION = ("a8acb2", "2a9d8f")  # as given, computed
 BOTH = ("2166ac", "92c5de", "f7f7f7", "f4a582", "b2182b")  # inwards to outwards
 INSTALL = ("pip install vtk h5py, or apt-get install --no-install-recommends python3-paraview python3-h5py "
            "xvfb xauth")

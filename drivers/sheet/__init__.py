@@ -5,6 +5,7 @@ import math
 
 # Colors of a distance in mm, from none to far: in pictures, pages and ParaView.
 RAMP = ("fcf3dc", "fed395", "fe9f6d", "f1605d", "c03a76", "832681", "4a1079")
+REGION = ("a8acb2", "2a9d8f")  # of skin as given, and computed
 
 
 def rounded_up(number):

@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 
-from sheet import RAMP, rounded_up
+from sheet import RAMP, REGION, rounded_up
 from sheet.landmarks import BONES, NEAR, Parts, known_places, place_landmarks
 from sheet.meshes import Pack, coarser
 from sheet.measures import (following, measured, occlusion, reference, shift_in_words, turns,
@@ -19,7 +19,6 @@ from sheet.words import PUBLISHED, by_part, paragraphs
 
 MOST_TRIANGLES = 80_000  # of the skin, and of all bones, in the view to turn
 UNCERTAIN = ("e8f0ea", "f3d9a4", "d9822b", "8c2d04")
-REGION = ("a8acb2", "2a9d8f")
 
 
 class Plan:

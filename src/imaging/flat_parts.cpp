@@ -1,9 +1,9 @@
 #include "flat_parts.h"
 
-#include <Eigen/Geometry>
 #include <cmath>
 
 #include "repose/surface/edges.h"
+#include "repose/surface/triangle_tree.h"
 
 namespace repose::imaging {
 using namespace surface;
@@ -28,10 +28,10 @@ class Parts {
         beside_[edges[e][0].triangle][edges[e][0].corner] = edges[e][1].triangle;
         beside_[edges[e][1].triangle][edges[e][1].corner] = edges[e][0].triangle;
       }
-    for (const auto& [a, b, c] : surface.triangles) {
-      const Vec3 &p = surface.points[a], &q = surface.points[b], &r = surface.points[c];
-      center_.push_back((p + q + r) / 3);
-      normal_.push_back((q - p).cross(r - p) / 2);
+    for (const Triangle& triangle : surface.triangles) {
+      const Corners at = corners(surface, triangle);
+      center_.push_back((at[0] + at[1] + at[2]) / 3);
+      normal_.push_back(scaled_normal(at) / 2);
     }
     last_visit_.assign(beside_.size(), -1);
   }

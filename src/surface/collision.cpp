@@ -14,7 +14,6 @@ namespace repose::surface {
 namespace {
 
 using Node = CollisionTree::Node;
-using Corners = std::array<Vec3, 3>;
 
 /// A pose with what the boxes need of it.
 struct Placement {

@@ -55,9 +55,7 @@ std::vector<Surface> split(const Surface& surface, const EdgeTable& edges) {
 
 double area_of(const Surface& surface) {
   double twice = 0;
-  for (const auto& [a, b, c] : surface.triangles)
-    twice +=
-        (surface.points[b] - surface.points[a]).cross(surface.points[c] - surface.points[a]).norm();
+  for (const Triangle& t : surface.triangles) twice += scaled_normal(corners(surface, t)).norm();
   return twice / 2;
 }
 

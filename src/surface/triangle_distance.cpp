@@ -7,8 +7,6 @@
 namespace repose::surface {
 namespace {
 
-using Corners = std::array<Vec3, 3>;
-
 void offer(const Vec3& p, const Vec3& q, ShortestSegment& best) {
   const double squared = (p - q).squaredNorm();
   if (squared < best.squared) best = {squared, (p + q) / 2};

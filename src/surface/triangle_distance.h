@@ -1,7 +1,5 @@
 #pragma once
-#include <array>
-
-#include "repose/base/geometry.h"
+#include "repose/surface/triangle_tree.h"
 
 namespace repose::surface {
 
@@ -14,6 +12,6 @@ struct ShortestSegment {
 /// From the nine pairs of sides, the six of a corner and the other triangle, and the crossings of a
 /// side and the other triangle (Ericson, Real-Time Collision Detection, 2005, ch. 5). Where
 /// rounding hides a crossing, a side or a corner is within rounding of the other triangle.
-ShortestSegment shortest_segment(const std::array<Vec3, 3>& a, const std::array<Vec3, 3>& b);
+ShortestSegment shortest_segment(const Corners& a, const Corners& b);
 
 }  // namespace repose::surface

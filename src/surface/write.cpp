@@ -1,6 +1,5 @@
 #include "repose/surface/write.h"
 
-#include <Eigen/Geometry>
 #include <bit>
 #include <climits>
 
@@ -8,6 +7,7 @@
 #include "repose/base/text.h"
 #include "repose/base/whole_file.h"
 #include "repose/surface/read.h"
+#include "repose/surface/triangle_tree.h"
 #include "soup.h"
 
 namespace repose::surface {
@@ -55,10 +55,9 @@ std::string stl_bytes(const Surface& surface) {
   std::string bytes = "binary STL, mm";
   bytes.resize(80, ' ');
   append(bytes, static_cast<uint32_t>(surface.triangles.size()));
-  for (const auto& [a, b, c] : surface.triangles) {
-    const Vec3 &p = surface.points[a], &q = surface.points[b], &r = surface.points[c];
-    const Vec3 normal = (q - p).cross(r - p).normalized();
-    for (const Vec3& vector : {normal, p, q, r})
+  for (const Triangle& triangle : surface.triangles) {
+    const Corners at = corners(surface, triangle);
+    for (const Vec3& vector : {Vec3(scaled_normal(at).normalized()), at[0], at[1], at[2]})
       for (int axis = 0; axis < 3; ++axis) append(bytes, static_cast<float>(vector[axis]));
     append(bytes, uint16_t{0});
   }
