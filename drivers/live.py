@@ -90,7 +90,7 @@ class Handler(http.server.BaseHTTPRequestHandler):
     protocol_version = "HTTP/1.1"
 
     def allowed(self, token):
-        """Whether a request has the token and was meant for this machine (no DNS rebinding)."""
+        """Returns whether a request has the token and was meant for this machine (no DNS rebinding)."""
         host = self.headers.get("Host", "").rsplit(":", 1)[0]
         good = hmac.compare_digest(token.encode(), self.server.token.encode())
         if good and host in ("127.0.0.1", "localhost"):
@@ -167,7 +167,7 @@ class Handler(http.server.BaseHTTPRequestHandler):
         return packed(head, arrays)
 
     def notice(self):
-        """What the page says beside its mark: the latest verification, and a scene that has changed."""
+        """Returns the text beside the mark of the page: the latest verification, and a scene that has changed."""
         session = self.server.session
         latest = session.verifications[-1:]
         said = {"text": latest[0].message if latest else "", "good": all(one.agrees for one in latest)}
@@ -190,7 +190,7 @@ class Handler(http.server.BaseHTTPRequestHandler):
         return self.server.session.write(self.server.output, plan).splitlines()
 
     def written(self, ending, lines):
-        """What was written, and a line for each warning of its summary."""
+        """Returns the name of the file written, and a line for each warning of its summary."""
         return "\n".join([f"{self.server.output}{ending}", *(sentence(*one) for one in cautions(lines))]).encode()
 
     def report(self, request):

@@ -77,7 +77,7 @@ def packed_bones(pack, session):
 
 
 def described(session, plan_map, command, about):
-    """What map.js needs, and the packed arrays."""
+    """The description that map.js reads, and the packed arrays."""
     pack, box = Pack(), plan_map.box
     coefficients = np.abs(plan_map.kriging.predict(plan_map.u)).max(axis=0)
     said = {
@@ -103,7 +103,7 @@ def page(chosen, session, plan_map):
 
 
 def summary(plan_map, accuracy):
-    """What the page rests on, in words."""
+    """Summary of the solved plans on which the map rests."""
     errors = plan_map.errors
     failed = len(plan_map.failed)
     return (f"Fitted to {len(errors)} plans solved to {accuracy:g} mm" +

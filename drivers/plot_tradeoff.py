@@ -90,7 +90,7 @@ def draw_methods(axes, rows, cost, label):
 
 
 def draw_choices(axes, rows):
-    """How far the skin is from the reference for each layer count, volume term and load step."""
+    """Draws the distance of the skin from the reference for each layer count, volume term and load step."""
     names = [STUDIES[row["study"]][1].format(row[STUDIES[row["study"]][0]]) for row in rows]
     place = np.arange(len(rows))
     axes.barh(place, [max(row["skin_max_mm"], 1e-6) for row in rows], color="0.85", label="largest")

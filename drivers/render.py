@@ -101,9 +101,9 @@ def vtk_version():
 
 
 def find_screen():
-    """Where there is no display VTK draws without one from 9.4 on. An older one does on a screen in
-    memory; where this interpreter has none, ParaView's does. That would take options for its own,
-    so they travel in the environment."""
+    """Finds a way to draw. Without a display VTK draws from 9.4 on, and an older one on a screen in memory.
+    Where this interpreter has no VTK, ParaView's draws. That would take options for its own, so they
+    travel in the environment."""
     own = importlib.util.find_spec("vtkmodules") is not None
     if own and has_display():
         return
@@ -258,7 +258,7 @@ class Result:
 
 
 def head(column, result):
-    """What stands above a column."""
+    """The title of a column."""
     unit = "N/mm²" if "prism/von_mises" in result.steps[-1] else "N"
     return {"movement": "movement, mm", "advance": "outwards, mm",
             "stress": ("stress, " if unit != "N" else "tension, ") + unit,
@@ -525,7 +525,7 @@ def panels(results, states, columns):
 
 
 def difference(results, states):
-    """How far the faces of two results are from each other, mm, at the vertices of the second."""
+    """Distances between the faces of two results, mm, at the vertices of the second."""
     first, second = (state["skin"] - result.before for result, state in zip(results, states))
     near = shown_skin.rows_of_patient(*results, [result.file for result in results])
     return np.linalg.norm(second - first[near], axis=1)

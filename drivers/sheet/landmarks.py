@@ -378,7 +378,7 @@ class Parts:
 
 
 def place_in_words(point, known, parts):
-    """Where a point is, as one says it: at a part of the face, else beside the nearest landmark."""
+    """Describes the place of a point: at a part of the face, else beside the nearest landmark."""
     row = parts.at(np.array([point]))[0] if parts else -1
     if row >= 0:
         return "at the " + Parts.NAMES[row]

@@ -55,7 +55,7 @@ def angle(*points):
 
 
 def in_front(*points):
-    """How far a point is in front of the line through two others, mm; negative behind it."""
+    """Distance of a point in front of the line through two others, mm; negative behind it."""
     point, one, other = in_profile(*points)
     line = (other - one) / np.linalg.norm(other - one)
     off = point - one
@@ -165,7 +165,7 @@ def turns_in_words(rotation):
 
 
 def reference(bone, marks):
-    """Where a bone's motion is measured: name and position of a landmark on it, or its centroid."""
+    """The place at which a bone's motion is measured: a landmark on it, or its centroid, in words and mm."""
     for name in ("upper incisor", "lower incisor", "chin bone"):
         if name in marks and marks[name]["on"] == bone["name"]:
             return f"at the {name}" + ("" if name == "chin bone" else "'s edge"), \

@@ -45,7 +45,7 @@ def matched(first, second):
 
 
 def uncertainties(plans):
-    """Of each plan, at the vertices of the first one's skin; None where it was not estimated."""
+    """The uncertainty of each plan at the vertices of the first one's skin; None where it was not estimated."""
     first, found = plans[0].result, []
     for result in (plan.result for plan in plans):
         unsure = result.uncertainty
@@ -82,7 +82,7 @@ def packed_skin(plans, appearance, others, pack):
 
 
 def is_oriented(points, corners):
-    """Whether nearly all triangles are counter-clockwise seen from outside."""
+    """Returns whether nearly all triangles are counter-clockwise seen from outside."""
     ends = np.stack([corners, np.roll(corners, -1, axis=1)], axis=2).reshape(-1, 2)
     _, count = np.unique(ends, axis=0, return_counts=True)
     a, b, c = (points[corners[:, k]] - points.mean(0) for k in range(3))
@@ -134,7 +134,7 @@ def same(bone, other):
 
 
 def described(plans, appearance):
-    """What sheet.js needs, and the packed arrays."""
+    """The description that sheet.js reads, and the packed arrays."""
     pack = Pack()
     others = [matched(*plans)] if len(plans) == 2 else []
     skin, fields = packed_skin(plans, appearance, others, pack)

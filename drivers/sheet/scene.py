@@ -38,7 +38,7 @@ BLANKS = str.maketrans("\t\x85\u2028\u2029", "    ")
 
 
 def parse(file, read):
-    """What `read` (yaml.load, yaml.compose) makes of the text of a scene, and the text."""
+    """Returns the result of `read` (yaml.load, yaml.compose) for the text of a scene, and the text."""
     with reading(file, "a scene in YAML"):
         text = pathlib.Path(file).read_text(encoding="utf-8-sig").translate(BLANKS)
         try:

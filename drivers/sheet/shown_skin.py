@@ -70,7 +70,7 @@ def sides_of_cuts(solved):
 
 
 def near(points, places, reach):
-    """Which points lie within `reach` of one of a few places."""
+    """Returns a mask of the points within `reach` of one of a few places."""
     found = np.zeros(len(points), bool)
     if len(places) == 0:
         return found

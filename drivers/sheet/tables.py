@@ -37,7 +37,7 @@ def table(head, rows):
 
 
 def opening(skin):
-    """How far the sides of cuts and lips, which begin at one place, are apart in the end, at most."""
+    """Largest final distance, mm, between sides of cuts and lips, which begin at one place."""
     _, place, count = np.unique(skin.before, axis=0, return_inverse=True, return_counts=True)
     place, farthest = place.ravel(), 0.0
     for shared in np.flatnonzero(count > 1):

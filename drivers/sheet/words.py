@@ -54,7 +54,7 @@ def verdict(result):
 
 
 def cautions(result, known, parts, guessed):
-    """Where not to trust the face, one sentence each."""
+    """Yields a sentence for each reason not to trust the face."""
     end = result.end
     if not end["converged"] or end["load"] < 1:
         yield (f"The run did not reach its accuracy: {end['reason']}. The bones have made "

@@ -6,7 +6,7 @@ namespace repose::base {
 
 namespace {
 
-// Whether every value of a floating-point type is a double.
+// Returns true where every value of a floating-point type is a double.
 bool fits_double(hid_t type) {
   size_t sign, exponent, exponent_bits, mantissa, mantissa_bits;
   check_hdf5(H5Tget_fields(type, &sign, &exponent, &exponent_bits, &mantissa, &mantissa_bits));

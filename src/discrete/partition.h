@@ -8,7 +8,7 @@
 
 namespace repose::discrete {
 
-/// Which columns share a spring, a prism or an edge, in compressed rows.
+/// Graph of columns that share a spring, a prism or an edge, in compressed rows.
 struct ColumnGraph {
   std::vector<int64_t> row_begin;  ///< [columns + 1]
   std::vector<int64_t> neighbor;   ///< sorted in each row, no column its own neighbor

@@ -32,7 +32,7 @@ struct Cell {
   bool cut() const { return ahead || kerf || behind; }
 };
 
-/// Which part of the bone each cell of an arrangement is.
+/// Assigns the cells of an arrangement to parts of the bone.
 class Sorter {
  public:
   Sorter(const Surface& bone, const Osteotomy& plan, const std::vector<CutSheet>& sheets,

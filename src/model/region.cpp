@@ -79,7 +79,7 @@ Contains inside(const scene::LabelRegion& region, double near) {
 constexpr double beside = 10;              // mm, of a painted mesh that is not the skin's
 constexpr double max_share_beside = 0.05;  // of its vertices that lie farther
 
-/// Which vertices are painted.
+/// Returns a flag for each vertex: 1 where it is painted.
 std::vector<char> painted_vertices(const scene::PaintedRegion& region,
                                    const surface::VertexValues& mesh) {
   constexpr double tolerance = 40;  // of 255: brushes blend at their rims

@@ -62,7 +62,7 @@ void measure_triangles(SkinMesh& mesh, const surface::Surface& skin) {
   for (Vec3& n : mesh.vertex_normal) n.normalize();
 }
 
-/// Which rows name a vertex: `lists` holds the vertices of each triangle or edge.
+/// Returns the rows that name each vertex; `lists` holds the vertices of each triangle or edge.
 template <class Lists>
 Rows invert(const Lists& lists, int64_t vertices) {
   Rows rows;

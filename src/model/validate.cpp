@@ -202,7 +202,7 @@ void check_arrays(const Model& m, const ArrayCheck& check) {
   check_cut_faces(m.contact.cut_faces, points, check);
 }
 
-// What arrays must be to one another.
+// Relations between arrays.
 
 void require_bones(const Points& p, const ArrayCheck& check) {
   for (size_t i = 0; i < p.set.size(); ++i)

@@ -13,7 +13,7 @@ std::string describe_shape(const std::vector<int64_t>& shape) {
   return fmt::format("[{}]", fmt::join(shape, ","));
 }
 
-// Whether `path` exists and its last link leads to an object.
+// Returns true where `path` exists and its last link leads to an object.
 bool link_resolves(hid_t file, const std::string& path) {
   for (size_t end = path.find('/', 1);; end = path.find('/', end + 1)) {
     const std::string part = path.substr(0, end);

@@ -37,7 +37,8 @@ mechanics::PrismSlope<double> volume_slope(const Model& model, size_t prism) {
       mechanics::PrismEdges<double>(mechanics::triples(model::corners_of(model, prism))));
 }
 
-/// Which local springs are skin, whose tension is given. The names are known on rank 0.
+/// Returns a flag for each local spring: 1 in the skin, whose tension is given. The names are known
+/// on rank 0.
 std::vector<char> skin_springs(MPI_Comm comm, const discrete::LocalModel& local_model) {
   const std::vector<std::string>& names = local_model.global_metadata.spring_sets;
   auto set = static_cast<int32_t>(std::ranges::find(names, "layer 0") - names.begin());

@@ -17,7 +17,7 @@ bool is_open(const EdgeTable& edges) {
   return false;
 }
 
-/// Which part each triangle belongs to, numbered in the order of their first triangle.
+/// Returns the part of each triangle; parts are numbered in the order of their first triangle.
 std::vector<int64_t> parts_of(const Surface& surface, const EdgeTable& edges, int64_t& count) {
   UnionFind sets = connected(surface.triangles, edges);
   std::vector<int64_t> part(surface.triangles.size());

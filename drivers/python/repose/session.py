@@ -18,7 +18,7 @@ COMPONENTS = ("tx", "ty", "tz", "rx", "ry", "rz")  # mm, then degrees
 
 
 class Refused(ValueError):
-    """What repose-live says about a request that it does not answer."""
+    """Raised with the message of repose-live for a request that it does not answer."""
 
 
 def vectors_of(piece, motion):
@@ -81,7 +81,7 @@ class GivenSkin:
     weights: np.ndarray    # [G, 16]
 
     def follow(self, displacement):
-        """Where its vertices are when the solved skin is displaced."""
+        """Returns the positions of its vertices when the solved skin is displaced."""
         return self.position + np.einsum("gk,gka->ga", self.weights, displacement[self.rows])
 
 
@@ -259,7 +259,7 @@ class Session:
 
     @property
     def scene_changed(self):
-        """Whether the scene or a file that it names has changed on disk since the session was started.
+        """True where the scene or a file that it names has changed on disk since the session was started.
         Its answers are those of the scene as it was."""
         return bool(self._watch and self._watch.changed())
 

@@ -11,7 +11,7 @@ namespace repose::discrete {
 /// collective.
 class NaturalRows {
  public:
-  /// Which ranks get rows: each its slab, or rank 0 all.
+  /// Ranks that get rows: each its slab, or rank 0 all.
   enum class Holders { slabs, root };
 
   /// `at_once` rows are carried at a time, in twice their memory.

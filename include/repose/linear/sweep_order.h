@@ -5,7 +5,7 @@
 
 namespace repose::linear {
 
-/// Which blocks of a matrix are not zero, in compressed rows.
+/// Nonzero blocks of a matrix, in compressed rows.
 struct BlockPattern {
   std::vector<int64_t> begin{0};  ///< [rows + 1]
   std::vector<int32_t> column;    ///< ascending in each row

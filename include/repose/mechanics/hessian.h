@@ -10,7 +10,7 @@
 /// Analytic Hessians of the terms as 3×3 blocks.
 namespace repose::mechanics {
 
-/// Which Hessian: the exact one, or a positive semidefinite one that leaves out what can be
+/// Form of the Hessian: the exact one, or a positive semidefinite one that leaves out what can be
 /// negative (the transverse stiffness T/r of a compressed spring, the curvature of v itself; of a
 /// solid as much of that as its edges do not outweigh).
 enum class Curvature { exact, semidefinite };

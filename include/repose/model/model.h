@@ -62,8 +62,8 @@ struct TermElements {
   int64_t points_each = 1, numbers_each = 0;
   std::vector<int64_t> points;  ///< [E, points_each]
   std::vector<double> numbers;  ///< [E, numbers_each] in the term's units
-  /// Which of the numbers is the row of a bone with which the element moves as one; −1: it does
-  /// not.
+  /// Column of the numbers that holds the row of the bone with which the element moves; −1: it
+  /// moves with none.
   int64_t bone_number = -1;
   size_t size() const { return points.size() / static_cast<size_t>(points_each); }
   std::span<const int64_t> points_of(size_t e) const {

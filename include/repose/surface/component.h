@@ -34,7 +34,7 @@ void append(const Surface& part, Surface& whole);
 Surface compact(std::string name, const std::vector<Vec3>& points, std::vector<Triangle> triangles);
 
 /// The parts connected by edges, the one of the largest |volume| first (of open ones the largest
-/// area). Points are renumbered, their order kept.
+/// area). Points are numbered in the order in which triangles name them.
 std::vector<Surface> components(const Surface& surface);
 
 /// The first of components().

@@ -13,7 +13,7 @@ struct GridGraph {
   std::vector<std::array<int32_t, 6>> capacity;  ///< what is left of it, once flow has gone
 };
 
-/// Which set holds a node: 0 neither, 1 the source, 2 the sink.
+/// The set that holds each node: 0 neither, 1 the source, 2 the sink.
 using Terminals = std::vector<uint8_t>;
 
 /// Sends the maximum flow from source to sink (Dinic 1970) and takes it off the capacities. True
