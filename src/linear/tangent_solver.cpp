@@ -1,9 +1,8 @@
 #include "repose/linear/tangent_solver.h"
 
 #include <algorithm>
-#include <limits>
+#include <cmath>
 
-#include "repose/base/collective.h"
 #include "repose/base/petsc.h"
 
 namespace repose::linear {
@@ -76,23 +75,19 @@ void TangentSolver::refresh(Vec displacement) {
 }
 
 void TangentSolver::throw_unsolvable() {
-  bool finite = true;
-  double softest = std::numeric_limits<double>::infinity(), stiffest = 0;
-  hessian_.visit_spd_blocks([&](int32_t p, int32_t q, const Mat3& block) {
-    if (!block.allFinite()) finite = false;
-    if (p != q) return;
-    softest = std::min(softest, block.trace() / 3);
-    stiffest = std::max(stiffest, block.trace() / 3);
-  });
-  const MPI_Comm comm = positions_.comm();
-  if (!base::on_all_ranks(comm, finite))
-    discrete::refuse_overflow("stiffnesses", positions_.load());
-  softest = -base::max_over_ranks(comm, -softest);
-  stiffest = base::max_over_ranks(comm, stiffest);
+  hessian_.renew();
+  const Mat matrix = hessian_.spd_approximation();
+  const base::VecHandle diagonal = positions_.make_vector();
+  PetscReal softest = 0, stiffest = 0, norm = 0;
+  check(MatGetDiagonal(matrix, diagonal));
+  check(VecMin(diagonal, nullptr, &softest));
+  check(VecMax(diagonal, nullptr, &stiffest));
+  check(MatNorm(matrix, NORM_FROBENIUS, &norm));
+  if (!std::isfinite(norm)) discrete::refuse_overflow("stiffnesses", positions_.load());
   base::refuse(
-      "stiffnesses at load {:.4g}, {:.2g} to {:.2g} N/mm of a point, lie too far apart for the "
-      "preconditioner; bring the moduli of strata and regions nearer together",
-      positions_.load(), softest, stiffest);
+      "stiffnesses of points at load {:.4g}, the largest {:.2g} times the smallest, lie too far "
+      "apart for the preconditioner; bring the moduli of strata and regions nearer together",
+      positions_.load(), stiffest / softest);
 }
 
 bool TangentSolver::solve(Vec displacement, Vec rhs, Vec delta, double relative_tolerance) {

@@ -83,6 +83,45 @@ TEST(TangentSolver, KeepsMultigridAfterOneSlowSolve) {
   EXPECT_FALSE(solver.preconditioner().by_factors());
 }
 
+/// Diagonal of fours, but for a block of ones, which is singular.
+class Singular : public discrete::Hessian {
+ public:
+  explicit Singular(Vec unknowns) {
+    PetscInt owned = 0, first = 0, last = 0;
+    base::check(VecGetLocalSize(unknowns, &owned));
+    base::check(MatCreateAIJ(MPI_COMM_WORLD, owned, owned, PETSC_DETERMINE, PETSC_DETERMINE, 2,
+                             nullptr, 0, nullptr, matrix_.out()));
+    base::check(MatGetOwnershipRange(matrix_, &first, &last));
+    for (PetscInt i = first; i < last; ++i)
+      for (PetscInt j = i < 2 ? 0 : i; j < (i < 2 ? 2 : i + 1); ++j)
+        base::check(MatSetValue(matrix_, i, j, i < 2 ? 1 : 4, INSERT_VALUES));
+    base::check(MatAssemblyBegin(matrix_, MAT_FINAL_ASSEMBLY));
+    base::check(MatAssemblyEnd(matrix_, MAT_FINAL_ASSEMBLY));
+    base::check(MatSetOption(matrix_, MAT_SPD, PETSC_TRUE));
+  }
+  void assemble(Vec) override { ++assemblies_; }
+  Mat exact() override { return matrix_; }
+  Mat spd_approximation() override { return matrix_; }
+  bool elliptic() const override { return false; }
+
+ private:
+  base::MatHandle matrix_;
+};
+
+TEST(TangentSolver, NamesStiffnessesThatLieTooFarApart) {
+  Solved s;
+  Singular singular(s.rhs);
+  linear::TangentSolver solver(s.positions, singular);
+  try {
+    solver.solve(s.rhs, s.rhs, s.answer, 1e-6);
+    FAIL() << "solved";
+  } catch (const base::InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("the largest 4 times the smallest, lie too far apart"),
+              std::string::npos)
+        << error.what();
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(Types, Preconditioner, ::testing::Values("cholesky", "columns", "gamg"));
 
 }  // namespace tangent_solver_test
