@@ -325,9 +325,10 @@ class Steps {
 
  private:
   void differentiate(Vec displacement, std::vector<model::PointField>& fields) {
-    summary_.gradient =
+    auto gradient =
         solve::differentiate(searcher_.problem(), natural_, displacement, settings_, fields);
-    summary_.abandoned = settings_.abandoned && settings_.abandoned();
+    summary_.abandoned = !gradient;
+    if (!settings_.derivatives.functional.empty()) summary_.gradient = std::move(gradient);
   }
 
   Searcher& searcher_;

@@ -238,8 +238,7 @@ std::optional<Gradient> differentiate(Problem& problem, const discrete::NaturalR
     }
   }
   objective.evaluate(displacement, slope);
-  if (!adjoint) return {};
-  return std::move(adjoint->result());
+  return adjoint ? std::move(adjoint->result()) : Gradient{};
 }
 
 }  // namespace repose::solve

@@ -17,7 +17,8 @@ namespace repose::solve {
 /// which ∇Φ is linear, its forces. The gradient of a scalar Σ w · x is wᵀ ∂x/∂p by one solve,
 /// H λ = w. One preconditioner serves all right-hand sides. The flags `finished` and `convex` say
 /// whether a linear solve reached the tolerance and met no negative curvature; where either is
-/// false its result is 0. Nothing where the settings' `abandoned` ends it. Collective.
+/// false its result is 0. Returns the gradient, which is empty where none is requested, or nothing
+/// where the settings' `abandoned` ended it before all were found. Collective.
 std::optional<Gradient> differentiate(Problem& problem, const discrete::NaturalRows& natural,
                                       Vec displacement, const Settings& settings,
                                       std::vector<model::PointField>& fields);

@@ -1,7 +1,5 @@
 #include <gtest/gtest.h>
 
-#include <utility>
-
 #include "repose/model/material.h"
 #include "rest.h"
 #include "solid_block.h"
@@ -67,20 +65,24 @@ TEST(RestDerivatives, AreTheDifferencesOfRestPositions) {
 
 TEST(RestDerivatives, EndWhereTheyAreAbandoned) {
   const scene::Placement at{{0.5, -1, 0.3}, {4, -2, 6}};
-  int calls = 0;
+  int questions = 0;  // whether to end, from the last iteration of the search on
   solve::Settings settings = testing::settings(1e-8);
-  settings.abandoned = [&] { return ++calls < 0; };
-  testing::find_rest(carried(at), settings);
-  const int searching = std::exchange(calls, 0);
   settings.derivatives.pieces = {{0, centroid, at}};
-  settings.abandoned = [&] { return ++calls > searching + 2; };
-  const testing::Rest rest = testing::find_rest(carried(at), settings);
-  EXPECT_TRUE(rest.summary.path.complete());
-  EXPECT_TRUE(rest.summary.abandoned);
-  const auto is_tangent = [](const model::PointField& field) {
-    return field.name.starts_with("tangent_");
+  settings.on_iterate = [&](double, const solve::StateSnapshot&) { questions = 0; };
+  const auto expect_tangents = [&](int expected, int answered_by_yes) {
+    settings.abandoned = [&] { return ++questions == answered_by_yes; };
+    const testing::Rest rest = testing::find_rest(carried(at), settings);
+    EXPECT_TRUE(rest.summary.path.complete());
+    EXPECT_EQ(rest.summary.abandoned, expected < 6);
+    EXPECT_EQ(std::ranges::count_if(rest.rows.point_fields,
+                                    [](const model::PointField& field) {
+                                      return field.name.starts_with("tangent_");
+                                    }),
+              expected);
   };
-  EXPECT_EQ(std::ranges::count_if(rest.rows.point_fields, is_tangent), 2);
+  expect_tangents(2, 4);  // the first question is the iteration's
+  expect_tangents(5, 7);
+  expect_tangents(6, 8);  // there is nothing left to end
 }
 
 /// `carried` with a plate of the piece that presses on the upper face.
