@@ -91,7 +91,10 @@ bool Listener::knows_token(int client) const {
 int Listener::accept() const {
   while (true) {
     const int client = ::accept4(socket_, nullptr, nullptr, SOCK_CLOEXEC);
-    if (client < 0) continue;
+    if (client < 0) {
+      if (errno == EINTR || errno == ECONNABORTED) continue;
+      base::refuse("-port {}: no client can connect: {}", port_, std::strerror(errno));
+    }
     if (knows_token(client)) return client;
     send_all(client,
              "{\"ok\":false,\"error\":\"the first line must be {\\\"token\\\": …} with the "

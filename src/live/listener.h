@@ -16,7 +16,7 @@ class Listener {
   int port() const { return port_; }
   const std::string& token() const { return token_; }
   /// Waits for a client whose first line is the token, {"token": "…"}; others are refused and
-  /// closed. The caller closes its descriptor.
+  /// closed. The caller closes its descriptor. Throws InputError where no client can connect.
   int accept() const;
 
  private:

@@ -16,9 +16,6 @@
 
 namespace repose::live {
 
-namespace {
-
-/// Rank 0's text on all ranks, which wait for it asleep.
 void broadcast_asleep(MPI_Comm comm, std::string& text) {
   using namespace std::chrono_literals;
   const auto wait = [](MPI_Request request) {
@@ -35,8 +32,6 @@ void broadcast_asleep(MPI_Comm comm, std::string& text) {
   MPI_Ibcast(text.data(), length, MPI_CHAR, 0, comm, &request);
   wait(request);
 }
-
-}  // namespace
 
 Requests::Requests(MPI_Comm comm, int input, int output)
     : comm_(comm), input_(input), output_(output) {

@@ -11,6 +11,9 @@
 
 namespace repose::live {
 
+/// Gives rank 0's text to all ranks, which wait for it asleep. Collective.
+void broadcast_asleep(MPI_Comm comm, std::string& text);
+
 /// Lines that a thread of rank 0 reads from a file descriptor as they come, for all ranks. Answers
 /// go to another descriptor, or the same socket.
 class Requests {

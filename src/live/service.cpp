@@ -292,6 +292,20 @@ void Service::solve(const Request& request, Reply& reply) {
   if (base::rank(comm_) == 0) add_arrays(answer, request.all_points, reply);
 }
 
+/// Waits for a client, whose descriptor rank 0 gets. Collective.
+int accept_client(MPI_Comm comm, const std::optional<Listener>& listener) {
+  int client = -1;
+  std::string refused;
+  try {
+    if (listener) client = listener->accept();
+  } catch (const base::InputError& error) {
+    refused = error.what();
+  }
+  broadcast_asleep(comm, refused);
+  if (!refused.empty()) throw base::InputError(refused);
+  return client;
+}
+
 }  // namespace
 
 base::Exit serve(MPI_Comm comm, const std::filesystem::path& scene, const Channel& channel) {
@@ -310,7 +324,7 @@ base::Exit serve(MPI_Comm comm, const std::filesystem::path& scene, const Channe
     send_all(channel.output, address.dump() + "\n");
   }
   for (bool quits = false; !quits;) {
-    const int client = listener ? listener->accept() : -1;
+    const int client = accept_client(comm, listener);
     quits = service.run(client, client);
     if (client >= 0) close(client);
   }

@@ -5,6 +5,7 @@ import os
 import pathlib
 import random
 import re
+import resource
 import shutil
 import socket
 import subprocess
@@ -329,6 +330,27 @@ def test_a_client_that_sends_no_more_gets_its_answer(listening):
     assert head["ok"] and head["converged"] and head["id"] == 7
     stream.close()
     client.close()
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_a_solver_that_can_accept_nobody_ends_in_one_line(small, environment, ranks):
+    launcher = ["mpirun", "-n", str(ranks)] if ranks > 1 else []
+    process = subprocess.Popen([*launcher, programs() / "repose-live", small, "-port", "0"], stdout=subprocess.PIPE,
+                               stderr=subprocess.PIPE, text=True, env={**os.environ, **environment})
+    try:
+        port = json.loads(process.stdout.readline())["port"]
+        for solver in children():
+            resource.prlimit(solver, resource.RLIMIT_NOFILE, (3, 3))
+        try:  # it may wait for a first client already, whose descriptor it has
+            socket.create_connection(("127.0.0.1", port), timeout=60).close()
+        except OSError:
+            pass  # it has ended
+        message = process.communicate(timeout=60)[1]
+        assert process.returncode == 1
+        assert f"-port {port}: no client can connect: Too many open files" in message
+    finally:
+        process.kill()
+        process.communicate()
 
 
 def damaged(random_numbers):
