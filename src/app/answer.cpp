@@ -1,12 +1,13 @@
 #include "answer.h"
 
+#include <algorithm>
+#include <limits>
+
 #include "bone_through_skin.h"
 #include "movement.h"
 #include "moving_border.h"
 #include "report.h"
-#include "repose/base/agreement.h"
 #include "repose/base/collective.h"
-#include "repose/results/model_file.h"
 #include "repose/scene/landmark_names.h"
 #include "repose/solve/supported.h"
 
@@ -32,13 +33,26 @@ std::string describe_warnings(const Job& job) {
          (job.anatomy ? describe_warnings(job.anatomy->move_warnings) : "");
 }
 
-std::string describe_folds(MPI_Comm comm, const std::filesystem::path& file,
-                           const solve::Summary& summary, const std::vector<double>& volume_ratio) {
-  if (summary.last.inverted_prisms == 0) return "";
-  const std::vector<double> ratios = base::gather(comm, volume_ratio);
-  std::string text;
-  base::on_root(comm, [&] { text = describe_folds(results::read_model(file), ratios); });
-  return text;
+std::string describe_folds(MPI_Comm comm, const discrete::Part& part, int64_t folded,
+                           const std::vector<double>& volume_ratio) {
+  if (folded == 0) return "";
+  const auto least = std::ranges::min_element(volume_ratio);
+  int64_t row = base::count_before(comm, volume_ratio.size()) + (least - volume_ratio.begin());
+  base::max_over_ranks_with(
+      comm, volume_ratio.empty() ? -std::numeric_limits<double>::infinity() : -*least, row);
+  const auto worst = std::ranges::find(part.prism_row, row);
+  const bool here = worst != part.prism_row.end();
+  Vec3 place = Vec3::Zero();
+  if (here) {
+    const auto& prism = part.model.prisms.points[worst - part.prism_row.begin()];
+    place = part.model.points.position[prism[0]];
+  }
+  base::max_over_ranks_with(comm, here, place);
+  return fmt::format(
+      "FOLDED: {} prisms of tissue are inside out, the worst one about {:.1f} mm: release more of "
+      "it there (tissue.release, tissue.unattached), let the rim be auto, or move less; "
+      "-allow_folded takes it as it is.\n",
+      folded, place);
 }
 
 std::string describe_touching(const Job& job, const SolvedSkin& skin, const std::vector<Vec3>& now,

@@ -21,10 +21,11 @@ std::string describe_answer(const Job& job, const SolvedSkin& skin, const std::v
 /// Rows for the warnings of a job: of its input, and of its moves. On rank 0.
 std::string describe_warnings(const Job& job);
 
-/// Prisms that are inside out at the end of `summary`; `volume_ratio` is this rank's slab. The
-/// result `file` has their model. Collective.
-std::string describe_folds(MPI_Comm comm, const std::filesystem::path& file,
-                           const solve::Summary& summary, const std::vector<double>& volume_ratio);
+/// Describes the number of prisms that are inside out, `folded`, and where the worst one was at
+/// first, in a line that says what can be done; nothing where there is none. `volume_ratio` is this
+/// rank's slab. Collective.
+std::string describe_folds(MPI_Comm comm, const discrete::Part& part, int64_t folded,
+                           const std::vector<double>& volume_ratio);
 
 /// Last rows: contact, columns that are pierced, and bone or skin that comes through the skin. On
 /// rank 0.

@@ -302,7 +302,8 @@ std::string PlanSession::write(const std::filesystem::path& name) {
   const std::string result = name.string() + ".h5";
   const SolvedSkin skin(s.comm, s.job);
   const std::vector<Vec3> now = skin.points_at(rows.position);
-  std::string text = describe_folds(s.comm, result, summary, rows.volume_ratio);
+  std::string text =
+      describe_folds(s.comm, s.job.local_model.part, numbers.inverted_prisms, rows.volume_ratio);
   const std::string given = write_given_skin(s.comm, s.job, name.string(), skin, now);
   base::on_root(s.comm, [&] {
     model::Anatomy& anatomy = *s.job.anatomy;

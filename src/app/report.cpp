@@ -251,20 +251,6 @@ std::string describe_tearing(const solve::Tearing& t) {
                            t.springs, t.prisms, t.triangles, t.length, t.middle);
 }
 
-std::string describe_folds(const model::Model& model, const std::vector<double>& volume_ratio) {
-  const auto worst = std::min_element(volume_ratio.begin(), volume_ratio.end());
-  if (worst == volume_ratio.end() || *worst > 0) return "";
-  const auto count = std::count_if(volume_ratio.begin(), volume_ratio.end(),
-                                   [](double ratio) { return ratio <= 0; });
-  const auto& points = model.prisms.points[worst - volume_ratio.begin()];
-  const Vec3& at = model.points.position[points[0]];
-  return fmt::format(
-      "FOLDED: {} prisms of tissue are inside out, the worst one about {:.1f} mm: release more of "
-      "it there (tissue.release, tissue.unattached), let the rim be auto, or move less; "
-      "-allow_folded takes it as it is.\n",
-      count, at);
-}
-
 std::string describe_path(const PathCheck& c) {
   const auto row = [](const std::string& text) { return report_row("path", text); };
   if (c.steps == 0) return row("none: nothing moves");

@@ -65,10 +65,6 @@ struct PathCheck {
 /// Describes the comparison in one row.
 std::string describe_path(const PathCheck& check);
 
-/// Describes the number of prisms that have volume ratios [M] ≤ 0 and where the worst one was at
-/// first, in a line that says what can be done; nothing where there is none.
-std::string describe_folds(const model::Model& model, const std::vector<double>& volume_ratio);
-
 /// Wall time (largest over ranks) and peak memory (summed over ranks) of each stage.
 std::string describe_stages(const base::Stages& stages);
 
