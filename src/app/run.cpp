@@ -148,9 +148,12 @@ bool Run::is_done(const model::StepNumbers& end) const {
 
 /// Makes a finished result that of this run's name, unless it is. Collective.
 void Run::copy_result(const std::filesystem::path& file) const {
-  std::ifstream one(file, std::ios::binary), other(name_ + ".h5", std::ios::binary);
-  using Bytes = std::istreambuf_iterator<char>;
-  bool same = other && std::equal(Bytes(one), Bytes(), Bytes(other), Bytes());
+  bool same = false;
+  base::on_root(comm, [&] {
+    std::ifstream one(file, std::ios::binary), other(name_ + ".h5", std::ios::binary);
+    using Bytes = std::istreambuf_iterator<char>;
+    same = other && std::equal(Bytes(one), Bytes(), Bytes(other), Bytes());
+  });
   base::broadcast(comm, same);
   if (same) return;
   results::ResultFile copy(comm, name_, job_.local_model.global_metadata,
