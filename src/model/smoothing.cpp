@@ -1,21 +1,21 @@
 #include "smoothing.h"
 
-#include <Eigen/IterativeLinearSolvers>
+#include <Eigen/SparseCholesky>
 #include <Eigen/SparseCore>
 #include <queue>
 
-#include "multilevel.h"
+#include "repose/base/error.h"
 
 namespace repose::model {
 namespace {
 
-using Sparse = Multilevel::Sparse;
+using Sparse = Eigen::SparseMatrix<double>;
 
-/// diag(a w) + Σ_e c_e ℓ_e² (graph Laplacian of e).
+/// Lower triangle of diag(a w) + Σ_e c_e ℓ_e² (graph Laplacian of e).
 Sparse smoothing_matrix(const SkinMesh& mesh, const Eigen::VectorXd& data,
                         const std::vector<double>& length) {
   std::vector<Eigen::Triplet<double>> entries;
-  entries.reserve(mesh.points.size() + 4 * mesh.edges.size());
+  entries.reserve(mesh.points.size() + 3 * mesh.edges.size());
   for (int64_t v = 0; v < data.size(); ++v) entries.emplace_back(v, v, data[v]);
   for (size_t e = 0; e < mesh.edges.size(); ++e) {
     const auto [p, q] = mesh.edges[e];
@@ -23,8 +23,7 @@ Sparse smoothing_matrix(const SkinMesh& mesh, const Eigen::VectorXd& data,
     const double c = 2.0 / 3.0 * mesh.edge_area[e] * over * over;
     entries.emplace_back(p, p, c);
     entries.emplace_back(q, q, c);
-    entries.emplace_back(p, q, -c);
-    entries.emplace_back(q, p, -c);
+    entries.emplace_back(q, p, -c);  // q > p
   }
   Sparse matrix(data.size(), data.size());
   matrix.setFromTriplets(entries.begin(), entries.end());
@@ -38,13 +37,10 @@ Eigen::MatrixXd smooth_field(const SkinMesh& mesh, const Eigen::MatrixXd& given,
   const auto vertices = static_cast<int64_t>(mesh.points.size());
   Eigen::VectorXd data(vertices);
   for (int64_t v = 0; v < vertices; ++v) data[v] = mesh.vertex_area[v] * weight[v];
-  const Sparse matrix = smoothing_matrix(mesh, data, length);
-  Eigen::ConjugateGradient<Sparse, Eigen::Lower | Eigen::Upper, Multilevel> solver(matrix);
-  solver.setTolerance(1e-6);
-  Eigen::MatrixXd field(given.rows(), given.cols());
-  for (int64_t k = 0; k < given.cols(); ++k)
-    field.col(k) = solver.solveWithGuess(data.cwiseProduct(given.col(k)), given.col(k));
-  return field;
+  const Eigen::SimplicialLDLT<Sparse> factors(smoothing_matrix(mesh, data, length));
+  if (factors.info() != Eigen::Success)
+    throw base::InternalError("a field over the skin cannot be smoothed: its matrix is singular");
+  return factors.solve(data.asDiagonal() * given);
 }
 
 std::vector<int64_t> limit_slope(const SkinMesh& mesh, double slope,

@@ -8,11 +8,10 @@
 namespace repose::model {
 
 /// Minimizes Σ_v a_v w_v |f_v − g_v|² + Σ_e c_e ℓ_e² |f_p − f_q|² over the field f: `given` g is
-/// [V × k], `weight` w ≥ 0 [V] says how much each value is trusted, `length` ℓ (mm) [V] over what
+/// [V × k], `weight` w > 0 [V] says how much each value is trusted, `length` ℓ (mm) [V] over what
 /// distance to smooth (averaged over an edge's ends), a_v is the vertex area and
 /// c_e = ⅔ edge_area / |e|² the positive form of the finite-element weights (equal to them on
-/// equilateral triangles), so that f never leaves the range of g. Conjugate gradients to 1e-6,
-/// preconditioned over coarser and coarser graphs: O(V).
+/// equilateral triangles), so that f never leaves the range of g. By sparse Cholesky factors.
 Eigen::MatrixXd smooth_field(const SkinMesh& mesh, const Eigen::MatrixXd& given,
                              const std::vector<double>& weight, const std::vector<double>& length);
 
