@@ -17,12 +17,7 @@ template <class Write>
 void add(const std::filesystem::path& file, const std::string& name, size_t bytes, Write&& write) {
   constexpr size_t of_format = 1 << 16;  // bytes, at most, beside data
   UnfinishedFile whole(file);
-  std::error_code error;
-  std::filesystem::copy_file(file, whole.part(), std::filesystem::copy_options::overwrite_existing,
-                             error);
-  if (error)
-    base::refuse("{}: cannot be copied: {}; free space or choose another -output", file.string(),
-                 error.message());
+  whole.copy_file();
   whole.reserve(static_cast<int64_t>(bytes + of_format));
   base::Hdf5File h5 = base::open_hdf5(whole.part(), MPI_COMM_SELF);
   if (base::hdf5_has(h5, "/" + name)) return;

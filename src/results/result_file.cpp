@@ -159,7 +159,6 @@ void ResultFile::State::mark_last(bool as_end) {
 void ResultFile::State::append(const model::StepNumbers& numbers, const model::StepRows& rows,
                                bool provisional_step) {
   const std::scoped_lock lock(mutex);
-  base::collective_try(part.comm(), [&] { writer->require_rows(rows); });
   const model::StepNumbers same = of_first_rank(part.comm(), numbers);
   part.open(writer->bytes());
   settle_last();

@@ -1,5 +1,7 @@
 #include "shared_part.h"
 
+#include <algorithm>
+
 #include "writer.h"
 
 namespace repose::results {
@@ -45,12 +47,7 @@ void SharedPart::continue_in_copy() {
   if (unfinished_) return;
   unfinished_.emplace(file_);
   part_ = unfinished_->part();
-  std::error_code error;
-  std::filesystem::copy_file(file_, part_, std::filesystem::copy_options::overwrite_existing,
-                             error);
-  if (error)
-    base::refuse("{}: cannot be written: {}; free space or choose another -output", file_.string(),
-                 error.message());
+  unfinished_->copy_file();
 }
 
 void SharedPart::open(int64_t bytes) {
@@ -79,10 +76,14 @@ base::Hdf5Group SharedPart::create_group(hid_t place, const std::string& group) 
 }
 
 void SharedPart::write_dataset(hid_t group, const char* dataset, std::array<int64_t, 2> shape,
-                               const base::Slab& mine, const double* values) const {
+                               const base::Slab& mine, std::span<const double> values) const {
   base::Hdf5Dataset created;
-  on_disk([&] { created = create_rows(group, dataset, shape[0], shape[1]); });
-  on_disk([&] { write_rows(comm_, created, mine, values); });
+  on_disk([&] {
+    if (static_cast<int64_t>(values.size()) != mine.rows() * std::max<int64_t>(shape[1], 1))
+      throw base::InternalError(fmt::format("{}: values are not this rank's slab", dataset));
+    created = create_rows(group, dataset, shape[0], shape[1]);
+  });
+  on_disk([&] { write_rows(comm_, created, mine, values.data()); });
 }
 
 void SharedPart::save() {

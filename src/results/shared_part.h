@@ -2,6 +2,7 @@
 #include <array>
 #include <functional>
 #include <optional>
+#include <span>
 
 #include "repose/base/agreement.h"
 #include "repose/base/hdf5.h"
@@ -34,9 +35,10 @@ class SharedPart {
   /// Work on the open part that all ranks do, and all fail if one does.
   void on_disk(const std::function<void()>& work) const;
   base::Hdf5Group create_group(hid_t place, const std::string& group) const;
-  /// Creates a dataset and writes this rank's rows of it. Collective.
+  /// Creates a dataset and writes this rank's rows of it; InternalError where `values` are not
+  /// these. Collective.
   void write_dataset(hid_t group, const char* dataset, std::array<int64_t, 2> shape,
-                     const base::Slab& mine, const double* values) const;
+                     const base::Slab& mine, std::span<const double> values) const;
 
   /// Goes on in a copy if the part is saved: what has the file's name is not touched any more.
   void continue_in_copy();

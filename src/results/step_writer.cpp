@@ -1,9 +1,16 @@
 #include "step_writer.h"
 
-#include <algorithm>
 #include <cmath>
 
 namespace repose::results {
+
+namespace {
+
+std::span<const double> numbers_of(const std::vector<Vec3>& vectors) {
+  return {flat(vectors), 3 * vectors.size()};
+}
+
+}  // namespace
 
 std::string group_of(size_t step) { return fmt::format("step/{:04}", step); }
 
@@ -26,31 +33,10 @@ int64_t StepWriter::bytes() const {
          16 * counts.springs + 48 * counts.prisms + 48 * counts.bone_points + (int64_t{1} << 16);
 }
 
-void StepWriter::require_rows(const model::StepRows& rows) const {
-  const FileCounts& counts = views_.counts();
-  const auto agrees = [&](size_t given, int64_t all) {
-    return static_cast<int64_t>(given) == part_.slab(all).rows();
-  };
-  if (!agrees(rows.position.size(), counts.points) ||
-      !agrees(rows.residual_force.size(), counts.points) ||
-      !agrees(rows.volume_ratio.size(), counts.prisms) ||
-      (counts.solid && !agrees(rows.pressure.size(), counts.prisms)) ||
-      !(rows.discretization_error.empty() ||
-        agrees(rows.discretization_error.size(), counts.points)) ||
-      !std::all_of(rows.point_fields.begin(), rows.point_fields.end(),
-                   [&](const model::PointField& field) {
-                     return agrees(field.values.size() / (field.vector ? 3 : 1), counts.points);
-                   }) ||
-      (counts.solid && !agrees(rows.stretch.size(), counts.prisms)) ||
-      !agrees(rows.elongation.size(), counts.springs) ||
-      !agrees(rows.tension.size(), counts.springs))
-    throw base::InternalError("a step's rows are not this rank's slab");
-}
-
 void StepWriter::write_field(hid_t group, const model::PointField& field) {
   const FileCounts& counts = views_.counts();
   part_.write_dataset(group, field.name.c_str(), {counts.points, field.vector ? 3 : 0},
-                      part_.slab(counts.points), field.values.data());
+                      part_.slab(counts.points), field.values);
   part_.on_disk([&] {
     if (field.texts.empty() && field.flags.empty()) return;
     const base::Hdf5Dataset dataset(H5Dopen2(group, field.name.c_str(), H5P_DEFAULT));
@@ -65,11 +51,12 @@ void StepWriter::write_points(hid_t step, const model::StepRows& rows) {
   const FileCounts& counts = views_.counts();
   const base::Hdf5Group group = part_.create_group(step, "point");
   const base::Slab mine = part_.slab(counts.points);
+  part_.write_dataset(group, "position", {counts.points, 3}, mine, numbers_of(rows.position));
   std::vector<Vec3> displacement(rows.position.size());
   for (size_t i = 0; i < displacement.size(); ++i) displacement[i] = rows.position[i] - initial_[i];
-  part_.write_dataset(group, "position", {counts.points, 3}, mine, flat(rows.position));
-  part_.write_dataset(group, "displacement", {counts.points, 3}, mine, flat(displacement));
-  part_.write_dataset(group, "residual_force", {counts.points, 3}, mine, flat(rows.residual_force));
+  part_.write_dataset(group, "displacement", {counts.points, 3}, mine, numbers_of(displacement));
+  part_.write_dataset(group, "residual_force", {counts.points, 3}, mine,
+                      numbers_of(rows.residual_force));
   model::PointField advance{"advance", false, std::vector<double>(displacement.size())};
   for (size_t i = 0; i < displacement.size(); ++i)
     advance.values[i] = displacement[i].dot(outward_[i]);
@@ -83,17 +70,18 @@ void StepWriter::write_elements(hid_t step, const model::StepRows& rows) const {
   const FileCounts& counts = views_.counts();
   const base::Hdf5Group prism = part_.create_group(step, "prism");
   const base::Slab prisms = part_.slab(counts.prisms);
-  part_.write_dataset(prism, "volume_ratio", {counts.prisms, 0}, prisms, rows.volume_ratio.data());
+  part_.write_dataset(prism, "volume_ratio", {counts.prisms, 0}, prisms, rows.volume_ratio);
   if (counts.solid) {
-    part_.write_dataset(prism, "pressure", {counts.prisms, 0}, prisms, rows.pressure.data());
-    part_.write_dataset(prism, "von_mises", {counts.prisms, 0}, prisms, rows.von_mises.data());
-    part_.write_dataset(prism, "principal_stretch", {counts.prisms, 3}, prisms, flat(rows.stretch));
+    part_.write_dataset(prism, "pressure", {counts.prisms, 0}, prisms, rows.pressure);
+    part_.write_dataset(prism, "von_mises", {counts.prisms, 0}, prisms, rows.von_mises);
+    part_.write_dataset(prism, "principal_stretch", {counts.prisms, 3}, prisms,
+                        numbers_of(rows.stretch));
   }
   if (counts.springs == 0) return;
   const base::Hdf5Group spring = part_.create_group(step, "spring");
   const base::Slab springs = part_.slab(counts.springs);
-  part_.write_dataset(spring, "elongation", {counts.springs, 0}, springs, rows.elongation.data());
-  part_.write_dataset(spring, "tension", {counts.springs, 0}, springs, rows.tension.data());
+  part_.write_dataset(spring, "elongation", {counts.springs, 0}, springs, rows.elongation);
+  part_.write_dataset(spring, "tension", {counts.springs, 0}, springs, rows.tension);
 }
 
 /// Writes the displacement of the bones and, if any has moved, where they are; returns whether any
@@ -108,8 +96,10 @@ bool StepWriter::write_bones(hid_t step, double load) const {
   const base::Hdf5Group group = part_.create_group(step, "bone_surface");
   const base::Slab mine{0, static_cast<int64_t>(bones_.points.size())};
   const std::vector<Vec3> displacement = displacements(bones_, at_load);
-  part_.write_dataset(group, "displacement", {counts.bone_points, 3}, mine, flat(displacement));
-  if (moved) part_.write_dataset(group, "points", {counts.bone_points, 3}, mine, flat(at_load));
+  part_.write_dataset(group, "displacement", {counts.bone_points, 3}, mine,
+                      numbers_of(displacement));
+  if (moved)
+    part_.write_dataset(group, "points", {counts.bone_points, 3}, mine, numbers_of(at_load));
   return moved;
 }
 

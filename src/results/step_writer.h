@@ -41,9 +41,8 @@ class StepWriter {
 
   /// Returns enough bytes for a step, its descriptions included.
   int64_t bytes() const;
-  /// Throws InternalError where the rows of a step are not this rank's slab.
-  void require_rows(const model::StepRows& rows) const;
-  /// Writes the next step; the numbers are the same on all ranks.
+  /// Writes the next step; the numbers are the same on all ranks. Throws InternalError where an
+  /// array is not this rank's slab.
   void write(const model::StepNumbers& numbers, const model::StepRows& rows);
 
  private:

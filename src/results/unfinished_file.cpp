@@ -44,6 +44,15 @@ void UnfinishedFile::write(const std::string& content) const {
                  std::strerror(errno));
 }
 
+void UnfinishedFile::copy_file() const {
+  std::error_code error;
+  std::filesystem::copy_file(file_, part_, std::filesystem::copy_options::overwrite_existing,
+                             error);
+  if (error)
+    base::refuse("{}: cannot be copied: {}; free space or choose another -output", file_.string(),
+                 error.message());
+}
+
 void UnfinishedFile::reserve(int64_t bytes) const {
   const int descriptor = open(part_.c_str(), O_WRONLY | O_CLOEXEC);
   const off_t end = lseek(descriptor, 0, SEEK_END);

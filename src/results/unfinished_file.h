@@ -13,10 +13,11 @@ class UnfinishedFile {
   ~UnfinishedFile();
   UnfinishedFile(UnfinishedFile&&) = delete;
 
-  const std::filesystem::path& file() const { return file_; }
   const std::filesystem::path& part() const { return part_; }
   /// Writes the whole content. InputError if the disk refuses.
   void write(const std::string& content) const;
+  /// Begins with what the file holds. InputError if the disk refuses.
+  void copy_file() const;
   /// Sets room for `bytes` more than the part holds aside on the disk, so that no write that
   /// many ranks take part in finds it full: MPI-IO hangs then. InputError where the disk has less.
   /// File systems that cannot reserve are requested their free space instead.
