@@ -1,7 +1,6 @@
 #include "repose/solve/load_path.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <limits>
 
@@ -51,16 +50,6 @@ class BulkLimit {
 void require_value(const Outcome& outcome, double load) {
   if (outcome.objective >= discrete::overflown) discrete::refuse_overflow("energies", load);
 }
-
-class Stopwatch {
- public:
-  double seconds() const {
-    return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
-  }
-
- private:
-  std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
-};
 
 }  // namespace
 
@@ -165,7 +154,7 @@ bool LoadPath::follows(const Attempt& now, const std::optional<Attempt>& coarser
 }
 
 void LoadPath::settle(Vec displacement, const OnStep& on_step) {
-  const Stopwatch watch;
+  const double begin = MPI_Wtime();
   objective_.positions().set_load(result_.load);
   result_.last = settings_.start_load > 0 ? search_.run_near(displacement, settings_.accuracy)
                                           : search_.run(displacement, settings_.accuracy);
@@ -174,7 +163,7 @@ void LoadPath::settle(Vec displacement, const OnStep& on_step) {
   require_value(result_.last, result_.load);
   objective_.positions().update(displacement);
   refuse_end();
-  on_step(result_.last, result_.load, watch.seconds());
+  on_step(result_.last, result_.load, MPI_Wtime() - begin);
 }
 
 void LoadPath::accept(const Outcome& outcome, double load, Vec displacement) {
@@ -196,7 +185,7 @@ void LoadPath::reject_step(const Attempt& tried) {
 }
 
 void LoadPath::try_guess(Vec displacement, Vec guess, const OnStep& on_step) {
-  const Stopwatch watch;
+  const double begin = MPI_Wtime();
   const double before = result_.load;
   const int64_t folded_before = inverted(displacement);
   // Those at a near guess are not those at the start of the path.
@@ -211,7 +200,7 @@ void LoadPath::try_guess(Vec displacement, Vec guess, const OnStep& on_step) {
   if (outcome.stopped || (outcome.converged && inverted(trial_) <= folded_before)) {
     accept(outcome, 1, displacement);
     result_.leapt = true;
-    on_step(result_.last, 1, watch.seconds());
+    on_step(result_.last, 1, MPI_Wtime() - begin);
   } else {
     objective_.positions().set_load(before);
     objective_.positions().update(displacement);
@@ -282,7 +271,7 @@ void LoadPath::follow(Vec displacement, double longest, double end, const OnStep
   int halvings = 0;
   std::optional<Attempt> coarser;
   while (result_.last.converged && !result_.last.stopped && result_.load < end - nearly) {
-    const Stopwatch watch;
+    const double begin = MPI_Wtime();
     const double target = result_.load + step;
     const double load = target > 1 - nearly ? 1 : target;
     Attempt tried = begin_step(displacement, load);
@@ -296,7 +285,7 @@ void LoadPath::follow(Vec displacement, double longest, double end, const OnStep
       step = std::min(longest, 2 * step);
       halvings = std::max(0, halvings - 1);
       coarser.reset();
-      on_step(result_.last, result_.load, watch.seconds());
+      on_step(result_.last, result_.load, MPI_Wtime() - begin);
     } else {
       reject_step(tried);
       step /= 2;
@@ -311,7 +300,7 @@ void LoadPath::follow(Vec displacement, double longest, double end, const OnStep
 /// fail, the path continues from `displacement`, which the requested steps have reached.
 void LoadPath::follow_again(Vec start, const discrete::ContactPressures& at_start, Vec displacement,
                             const OnStep& on_step) {
-  const Stopwatch watch;
+  const double begin = MPI_Wtime();
   const discrete::ContactPressures reached_pressures = search_.pressures();
   const PathOutcome reached = result_;
   discrete::Positions& positions = objective_.positions();
@@ -328,7 +317,7 @@ void LoadPath::follow_again(Vec start, const discrete::ContactPressures& at_star
   if (result_.complete() || (result_.load == 1 && refused)) {
     check(VecCopy(start, displacement));
     result_.steps = reached.steps + 1;
-    on_step(result_.last, result_.load, watch.seconds());
+    on_step(result_.last, result_.load, MPI_Wtime() - begin);
     return;
   }
   const bool stopped = result_.last.stopped;

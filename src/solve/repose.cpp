@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <limits>
@@ -115,13 +114,11 @@ class Watcher {
   }
   void print(const Iteration& i, const std::string& to_go) {
     progress_.clear();
-    const double elapsed = std::chrono::duration<double>(Clock::now() - begin_).count();
-    fmt::print("  {:8.2f} s  load {:.4f}  iteration {:4d}  {:6d} evaluations  {}\n", elapsed,
-               i.load, i.number, i.evaluations, to_go);
+    fmt::print("  {:8.2f} s  load {:.4f}  iteration {:4d}  {:6d} evaluations  {}\n",
+               MPI_Wtime() - begin_, i.load, i.number, i.evaluations, to_go);
     std::fflush(stdout);
   }
 
-  using Clock = std::chrono::steady_clock;
   base::Progress progress_;
   base::Interrupt* interrupt_;
   std::function<bool()> abandoned_;
@@ -130,7 +127,7 @@ class Watcher {
   double farthest_ = 0, nearest_ = 0;  // mm, in this search
   std::string activity_;
   bool prints_;
-  Clock::time_point begin_ = Clock::now();
+  double begin_ = MPI_Wtime();  // s
 };
 
 /// Search for the rest position of a model under the settings. One object so that its parts live
