@@ -111,8 +111,7 @@ double largest_block(Vec v) {
   for (PetscInt k = 0; k + 2 < size; k += 3)
     largest = std::max(largest, Eigen::Map<const Vec3>(values + k).squaredNorm());
   check(VecRestoreArrayRead(v, &values));
-  const MPI_Comm comm = PetscObjectComm(reinterpret_cast<PetscObject>(static_cast<Vec>(v)));
-  return std::sqrt(base::max_over_ranks(comm, largest));
+  return std::sqrt(base::max_over_ranks(base::comm_of(v), largest));
 }
 
 }  // namespace repose::discrete

@@ -23,10 +23,7 @@ void choose_factors(PC pc) {
 /// MUMPS sets too little memory aside for factors on many ranks.
 void give_room(PC pc) {
   constexpr int more_memory = 14, percent = 100;  // ICNTL
-  PetscBool factors = PETSC_FALSE;
-  check(
-      PetscObjectTypeCompareAny(reinterpret_cast<PetscObject>(pc), &factors, PCCHOLESKY, PCLU, ""));
-  if (!factors) return;
+  if (!base::has_type(pc, PCCHOLESKY, PCLU)) return;
   Mat factor = nullptr;
   MatSolverType type = nullptr;
   check(PCFactorSetUpMatSolverType(pc));
@@ -45,11 +42,7 @@ double price_of_renewal(double usual) {
   return price;
 }
 
-bool is_columns(PC pc) {
-  PetscBool same = PETSC_FALSE;
-  check(PetscObjectTypeCompare(reinterpret_cast<PetscObject>(pc), columns_type, &same));
-  return same;
-}
+bool is_columns(PC pc) { return base::has_type(pc, columns_type); }
 
 int64_t unknowns(const discrete::Positions& positions) {
   return 3 * positions.part().unknowns.total;  // scalar, of all ranks

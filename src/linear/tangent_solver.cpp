@@ -9,17 +9,6 @@ namespace repose::linear {
 
 using base::check;
 
-namespace {
-
-/// MINRES has no natural norm.
-void choose_norm(KSP krylov) {
-  PetscBool minres = PETSC_FALSE;
-  check(PetscObjectTypeCompare(reinterpret_cast<PetscObject>(krylov), KSPMINRES, &minres));
-  if (minres) check(KSPSetNormType(krylov, KSP_NORM_PRECONDITIONED));
-}
-
-}  // namespace
-
 TangentSolver::TangentSolver(discrete::Positions& positions, discrete::Hessian& hessian)
     : positions_(positions),
       hessian_(hessian),
@@ -36,7 +25,8 @@ void TangentSolver::make_krylov() {
   check(KSPSetTolerances(krylov_, coarsest, 0.0, PETSC_DEFAULT, 500));
   preconditioner_.attach(krylov_);
   base::check_options(KSPSetFromOptions(krylov_));
-  choose_norm(krylov_);
+  if (base::has_type<KSP>(krylov_, KSPMINRES))  // has no natural norm
+    check(KSPSetNormType(krylov_, KSP_NORM_PRECONDITIONED));
   check(KSPGetTolerances(krylov_, &most_left_, nullptr, nullptr, nullptr));
   check(KSPSetOperators(krylov_, hessian_.action(), preconditioner_.matrix()));
 }
@@ -113,8 +103,8 @@ void TangentSolver::product_of_solution(Vec rhs, Vec product) {
   check(VecWAXPY(product, -1.0, left, rhs));
 }
 
-CgInPlaceOfPreonly::CgInPlaceOfPreonly(KSP krylov) : krylov_(krylov) {
-  check(PetscObjectTypeCompare(reinterpret_cast<PetscObject>(krylov), KSPPREONLY, &replaced_));
+CgInPlaceOfPreonly::CgInPlaceOfPreonly(KSP krylov)
+    : krylov_(krylov), replaced_(base::has_type(krylov, KSPPREONLY)) {
   if (replaced_) check(KSPSetType(krylov_, KSPCG));
 }
 

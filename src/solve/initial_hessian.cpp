@@ -37,8 +37,6 @@ LmvmOptions requested_by_options(MPI_Comm comm, bool solid = false) {
   return requested;
 }
 
-MPI_Comm comm_of(Mat matrix) { return PetscObjectComm(reinterpret_cast<PetscObject>(matrix)); }
-
 }  // namespace
 
 void StepLag::renew() {
@@ -61,12 +59,13 @@ bool StepLag::observe(double force, double length) {
 }
 
 InitialHessian::InitialHessian(Tao tao, linear::TangentSolver& solver)
-    : solver_(solver), lag_(requested_by_options(comm_of(solver.hessian().action())).price) {
+    : solver_(solver), lag_(requested_by_options(base::comm_of(solver.hessian().action())).price) {
   const Mat action = solver.hessian().action();
   PetscInt rows = 0, all_rows = 0;
   check(MatGetLocalSize(action, &rows, nullptr));
   check(MatGetSize(action, &all_rows, nullptr));
-  check(MatCreateShell(comm_of(action), rows, rows, all_rows, all_rows, this, inverse_.out()));
+  check(
+      MatCreateShell(base::comm_of(action), rows, rows, all_rows, all_rows, this, inverse_.out()));
   check(MatShellSetOperation(inverse_, MATOP_SOLVE, reinterpret_cast<void (*)()>(apply)));
   check(MatSetUp(inverse_));
   check(TaoLMVMSetH0(tao, inverse_));

@@ -48,7 +48,7 @@ PetscInt eigenvalues_below(Mat matrix, double shift) {
   check(MatDuplicate(matrix, MAT_COPY_VALUES, shifted.out()));
   check(MatShift(shifted, -shift));
   linear::KspHandle krylov;
-  check(KSPCreate(PetscObjectComm(reinterpret_cast<PetscObject>(matrix)), krylov.out()));
+  check(KSPCreate(base::comm_of(matrix), krylov.out()));
   check(KSPSetOperators(krylov, shifted, shifted));
   choose_factors(krylov);
   PC pc = nullptr;
@@ -102,7 +102,7 @@ void choose_preconditioned(EPS eps, linear::TangentSolver& solver) {
 EpsHandle symmetric_problem(Mat matrix, double tolerance, int maximum) {
   start_slepc();
   EpsHandle eps;
-  check(EPSCreate(PetscObjectComm(reinterpret_cast<PetscObject>(matrix)), eps.out()));
+  check(EPSCreate(base::comm_of(matrix), eps.out()));
   check(EPSSetOperators(eps, matrix, nullptr));
   check(EPSSetProblemType(eps, EPS_HEP));
   check(EPSSetTolerances(eps, tolerance, maximum));

@@ -18,17 +18,8 @@ namespace {
 // rest position, closely near it (superlinear: Dembo, Eisenstat & Steihaug 1982).
 constexpr double coarsest_forcing = 0.1, finest_forcing = 1e-3;
 
-bool has_type(Tao tao, TaoType type) {
-  PetscBool same = PETSC_FALSE;
-  check(PetscObjectTypeCompare(reinterpret_cast<PetscObject>(tao), type, &same));
-  return same;
-}
-
 bool uses_hessian(Tao tao) {
-  PetscBool newton = PETSC_FALSE;
-  check(PetscObjectTypeCompareAny(reinterpret_cast<PetscObject>(tao), &newton, TAONLS, TAONTR,
-                                  TAONTL, TAOBNLS, TAOBNTR, TAOBNTL, ""));
-  return newton;
+  return base::has_type(tao, TAONLS, TAONTR, TAONTL, TAOBNLS, TAOBNTR, TAOBNTL);
 }
 
 std::string reason_text(TaoConvergedReason reason) {
@@ -115,7 +106,7 @@ TaoSearch::TaoSearch(discrete::Function& function, linear::TangentSolver& solver
   check(TaoSetMaximumFunctionEvaluations(tao_, 100000));
   check(TaoSetConvergenceTest(tao_, Callbacks::converged, this));
   base::check_options(TaoSetFromOptions(tao_));
-  if (has_type(tao_, TAOLMVM) && begins_with_stiffness(function_.positions()))
+  if (base::has_type<Tao>(tao_, TAOLMVM) && begins_with_stiffness(function_.positions()))
     initial_ = std::make_unique<InitialHessian>(tao_, solver_);
   if (method() == Method::newton) make_forcing();
 }

@@ -68,6 +68,23 @@ using MatHandle = Handle<Mat, MatDestroy>;
 using ScatterHandle = Handle<VecScatter, VecScatterDestroy>;
 using IndexSetHandle = Handle<IS, ISDestroy>;
 
+/// Returns whether a PETSc object is of one of the types.
+template <class Object, class... Types>
+bool has_type(Object object, Types... types) {
+  const auto is = [object](const char* type) {
+    PetscBool same = PETSC_FALSE;
+    check(PetscObjectTypeCompare(reinterpret_cast<PetscObject>(object), type, &same));
+    return same == PETSC_TRUE;
+  };
+  return (is(types) || ...);
+}
+
+/// Returns the communicator of a PETSc object.
+template <class Object>
+MPI_Comm comm_of(Object object) {
+  return PetscObjectComm(reinterpret_cast<PetscObject>(object));
+}
+
 /// PETSc and MPI for the life of a program: initializes both (root may run Open MPI), makes PETSc
 /// return its errors instead of aborting, finalizes. Collective.
 class Session {

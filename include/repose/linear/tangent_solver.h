@@ -61,11 +61,11 @@ class CgInPlaceOfPreonly {
   explicit CgInPlaceOfPreonly(KSP krylov);
   ~CgInPlaceOfPreonly();
   CgInPlaceOfPreonly(CgInPlaceOfPreonly&&) = delete;
-  bool replaced() const { return replaced_ == PETSC_TRUE; }
+  bool replaced() const { return replaced_; }
 
  private:
   KSP krylov_;
-  PetscBool replaced_ = PETSC_FALSE;
+  bool replaced_;
 };
 
 }  // namespace repose::linear
