@@ -15,24 +15,6 @@ namespace {
 
 constexpr const char* columns_type = "columns";
 
-void choose_factors(PC pc) {
-  check(PCSetType(pc, PCCHOLESKY));
-  check(PCFactorSetMatSolverType(pc, MATSOLVERMUMPS));
-}
-
-/// MUMPS sets too little memory aside for factors on many ranks.
-void give_room(PC pc) {
-  constexpr int more_memory = 14, percent = 100;  // ICNTL
-  if (!base::has_type(pc, PCCHOLESKY, PCLU)) return;
-  Mat factor = nullptr;
-  MatSolverType type = nullptr;
-  check(PCFactorSetUpMatSolverType(pc));
-  check(PCFactorGetMatrix(pc, &factor));
-  check(MatFactorGetSolverType(factor, &type));
-  if (!type || std::string_view(type) != MATSOLVERMUMPS) return;
-  check(MatMumpsSetIcntl(factor, more_memory, percent));
-}
-
 /// In iterations: what a new preconditioner costs as much as.
 constexpr double price_of_columns = 10, price_of_factors = 20;
 
@@ -49,6 +31,23 @@ int64_t unknowns(const discrete::Positions& positions) {
 }
 
 }  // namespace
+
+void choose_factors(PC pc) {
+  check(PCSetType(pc, PCCHOLESKY));
+  check(PCFactorSetMatSolverType(pc, MATSOLVERMUMPS));
+}
+
+void give_room(PC pc) {
+  constexpr int more_memory = 14, percent = 100;  // ICNTL
+  if (!base::has_type(pc, PCCHOLESKY, PCLU)) return;
+  Mat factor = nullptr;
+  MatSolverType type = nullptr;
+  check(PCFactorSetUpMatSolverType(pc));
+  check(PCFactorGetMatrix(pc, &factor));
+  check(MatFactorGetSolverType(factor, &type));
+  if (!type || std::string_view(type) != MATSOLVERMUMPS) return;
+  check(MatMumpsSetIcntl(factor, more_memory, percent));
+}
 
 HessianPreconditioner::HessianPreconditioner(discrete::Positions& positions,
                                              discrete::Hessian& hessian)

@@ -32,35 +32,23 @@ double largest_diagonal(Mat matrix) {
   return largest;
 }
 
-void choose_factors(KSP krylov) {
-  PC pc = nullptr;
-  check(KSPSetType(krylov, KSPPREONLY));
-  check(KSPGetPC(krylov, &pc));
-  check(PCSetType(pc, PCCHOLESKY));
-  check(PCFactorSetMatSolverType(pc, MATSOLVERMUMPS));
-}
-
 /// Returns the number of eigenvalues below `shift`: that of negative pivots of H − shift.
 PetscInt eigenvalues_below(Mat matrix, double shift) {
-  // ICNTL: without ScaLAPACK, which does not know the inertia, and with room on many ranks.
-  constexpr int parallel_root = 13, more_memory = 14;
+  constexpr int parallel_root = 13;  // ICNTL: no ScaLAPACK, which does not know the inertia
   base::MatHandle shifted;
   check(MatDuplicate(matrix, MAT_COPY_VALUES, shifted.out()));
   check(MatShift(shifted, -shift));
-  linear::KspHandle krylov;
-  check(KSPCreate(base::comm_of(matrix), krylov.out()));
-  check(KSPSetOperators(krylov, shifted, shifted));
-  choose_factors(krylov);
-  PC pc = nullptr;
-  Mat factors = nullptr;
-  check(KSPGetPC(krylov, &pc));
-  check(PCFactorSetUpMatSolverType(pc));
-  check(PCFactorGetMatrix(pc, &factors));
-  check(MatMumpsSetIcntl(factors, parallel_root, 1));
-  check(MatMumpsSetIcntl(factors, more_memory, 100));
-  check(KSPSetUp(krylov));
+  linear::PcHandle factors;
+  check(PCCreate(base::comm_of(matrix), factors.out()));
+  check(PCSetOperators(factors, shifted, shifted));
+  linear::choose_factors(factors);
+  linear::give_room(factors);
+  Mat factored = nullptr;
+  check(PCFactorGetMatrix(factors, &factored));
+  check(MatMumpsSetIcntl(factored, parallel_root, 1));
+  check(PCSetUp(factors));
   PetscInt below = 0;
-  check(MatGetInertia(factors, &below, nullptr, nullptr));
+  check(MatGetInertia(factored, &below, nullptr, nullptr));
   return below;
 }
 
@@ -77,13 +65,16 @@ double shift_below_all(Mat matrix) {
 void choose_shift_and_invert(EPS eps, Mat matrix) {
   ST st = nullptr;
   KSP krylov = nullptr;
+  PC pc = nullptr;
   check(EPSSetType(eps, EPSKRYLOVSCHUR));
   check(EPSSetWhichEigenpairs(eps, EPS_TARGET_MAGNITUDE));
   check(EPSSetTarget(eps, shift_below_all(matrix)));
   check(EPSGetST(eps, &st));
   check(STSetType(st, STSINVERT));
   check(STGetKSP(st, &krylov));
-  choose_factors(krylov);
+  check(KSPSetType(krylov, KSPPREONLY));
+  check(KSPGetPC(krylov, &pc));
+  linear::choose_factors(pc);
 }
 
 void choose_preconditioned(EPS eps, linear::TangentSolver& solver) {

@@ -10,6 +10,12 @@ namespace repose::linear {
 
 using PcHandle = base::Handle<PC, PCDestroy>;
 
+/// Chooses MUMPS' Cholesky factors.
+void choose_factors(PC pc);
+/// Gives MUMPS more memory: it sets too little aside for factors on many ranks. Nothing where there
+/// are other factors, or none. The matrix is known.
+void give_room(PC pc);
+
 /// A preconditioner and what has been found out with it.
 struct KeptPreconditioner {
   std::shared_ptr<ColumnMultigrid> columns;
