@@ -258,13 +258,6 @@ model::CutFaces gather_cut_faces(MPI_Comm comm, const Part& part) {
   return faces;
 }
 
-void append(const model::TermElements& elements, size_t e, model::TermElements& to) {
-  const auto points = elements.points_of(e);
-  const auto numbers = elements.numbers_of(e);
-  to.points.insert(to.points.end(), points.begin(), points.end());
-  to.numbers.insert(to.numbers.end(), numbers.begin(), numbers.end());
-}
-
 /// The elements of all parts by their first points, of which each has one at most. On rank 0;
 /// collective.
 std::vector<model::TermElements> gather_elements(MPI_Comm comm, const Part& part) {
@@ -278,7 +271,8 @@ std::vector<model::TermElements> gather_elements(MPI_Comm comm, const Part& part
                 unsorted.bone_number};
     std::map<int64_t, size_t> by_point;
     for (size_t e = 0; e < unsorted.size(); ++e) by_point[unsorted.points_of(e)[0]] = e;
-    for (const auto& [point, e] : by_point) append(unsorted, e, elements);
+    for (const auto& [point, e] : by_point)
+      elements.add(unsorted.points_of(e), unsorted.numbers_of(e));
   }
   if (base::rank(comm) > 0) all.clear();
   return all;

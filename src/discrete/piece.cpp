@@ -92,12 +92,6 @@ std::vector<int64_t> element_rows(const Piece& piece,
   return rows;
 }
 
-template <size_t n>
-void number(std::vector<std::array<int64_t, n>>& elements, LocalNumbers& local) {
-  for (auto& element : elements)
-    for (int64_t& point : element) point = local.of(point);
-}
-
 void pick_points(Piece& piece, Part& part) {
   model::Points& mine = part.model.points;
   mine = pick_rows(std::move(piece.model.points), part.point_row);
@@ -119,8 +113,8 @@ std::vector<surface::Surface> body_meshes(const Model& model) {
 }
 
 /// The constraints of the points that a rank owns.
-model::Contact pick_contact(const Piece& piece, const std::vector<double>& offset,
-                            LocalNumbers& local, int rank, std::vector<int64_t>& pair_row) {
+model::Contact pick_contact(const Piece& piece, const std::vector<double>& offset, int rank,
+                            std::vector<int64_t>& pair_row) {
   const model::Contact& all = piece.model.contact;
   const auto mine = [&](const std::vector<int64_t>& points) {
     std::vector<int64_t> rows;
@@ -129,56 +123,45 @@ model::Contact pick_contact(const Piece& piece, const std::vector<double>& offse
         rows.push_back(static_cast<int64_t>(c));
     return rows;
   };
-  const auto number_all = [&](std::vector<int64_t>& points) {
-    for (int64_t& point : points) point = local.of(point);
-  };
   model::Contact part{all.stiffness, all.spacing, {}, {}, {}};
   const std::vector<int64_t>& rows = pair_row = mine(all.pairs.point);
   part.pairs = pick_rows(all.pairs, rows);
   part.pairs.offset = pick(offset, rows);
-  number_all(part.pairs.point);
   if (all.cut_faces.empty() || piece.owner[all.cut_faces.point.front()] != rank) return part;
   part.cut_faces = all.cut_faces;
-  number_all(part.cut_faces.point);
   return part;
 }
 
-void pick_springs(Piece& piece, LocalNumbers& local, int rank, Part& part) {
+void pick_springs(Piece& piece, int rank, Part& part) {
   Model& model = piece.model;
   auto rows = element_rows(piece, model.springs.points, rank, part.owned_springs);
   part.model.springs = pick_rows(std::move(model.springs), rows);
-  number(part.model.springs.points, local);
   rows.resize(part.owned_springs);
   part.spring_row = pick(piece.spring_row, rows);
 }
 
 /// Prisms, and edges.
-void pick_solid(Piece& piece, LocalNumbers& local, int rank, Part& part) {
+void pick_solid(Piece& piece, int rank, Part& part) {
   Model& model = piece.model;
   std::vector<char> surrounded;
   if (model::is_solid(model)) surrounded = surrounded_points(piece, rank);
   auto rows = element_rows(piece, model.prisms.points, rank, part.owned_prisms, surrounded);
   part.model.prisms = pick_rows(std::move(model.prisms), rows);
-  number(part.model.prisms.points, local);
   rows.resize(part.owned_prisms);
   part.prism_row = pick(piece.prism_row, rows);
   rows = element_rows(piece, model.edges.points, rank, part.owned_edges);
   part.model.edges = pick_rows(std::move(model.edges), rows);
-  number(part.model.edges.points, local);
   rows.resize(part.owned_edges);
   part.edge_row = pick(piece.edge_row, rows);
 }
 
 /// Those of further terms that a rank owns the first point of, or an unknown.
-model::TermElements pick_elements(const Piece& piece, const model::TermElements& all,
-                                  LocalNumbers& local, int rank) {
+model::TermElements pick_elements(const Piece& piece, const model::TermElements& all, int rank) {
   model::TermElements mine{all.term, all.points_each, all.numbers_each, {}, {}, all.bone_number};
   for (size_t e = 0; e < all.size(); ++e) {
     const auto points = all.points_of(e);
-    const auto numbers = all.numbers_of(e);
-    if (piece.owner[points[0]] != rank && !touches(piece, points, rank)) continue;
-    for (const int64_t point : points) mine.points.push_back(local.of(point));
-    mine.numbers.insert(mine.numbers.end(), numbers.begin(), numbers.end());
+    if (piece.owner[points[0]] == rank || touches(piece, points, rank))
+      mine.add(points, all.numbers_of(e));
   }
   return mine;
 }
@@ -193,12 +176,12 @@ std::vector<int64_t> own_points(const Piece& piece, int rank) {
 }
 
 /// The bodies, where any rank has contact, and the constraints. Collective.
-void add_contact(MPI_Comm comm, const Piece& piece, LocalNumbers& local, Part& part) {
+void add_contact(MPI_Comm comm, const Piece& piece, Part& part) {
   const Model& model = piece.model;
   part.contact = base::on_any_rank(comm, !model.contact.empty());
   if (part.contact)
     base::collective_try(comm, [&] { part.bodies = mechanics::make_bodies(model); });
-  part.model.contact = pick_contact(piece, mechanics::contact_offsets(model, part.bodies), local,
+  part.model.contact = pick_contact(piece, mechanics::contact_offsets(model, part.bodies),
                                     base::rank(comm), part.pair_row);
   if (!part.bodies.empty()) part.body_meshes = body_meshes(model);
 }
@@ -209,13 +192,14 @@ Part make_part(MPI_Comm comm, Piece& piece, const std::vector<int64_t>& own) {
   const int rank = base::rank(comm);
   Part part;
   part.owned_points = static_cast<int64_t>(own.size());
+  pick_springs(piece, rank, part);
+  pick_solid(piece, rank, part);
+  for (const model::TermElements& elements : model.elements)
+    part.model.elements.push_back(pick_elements(piece, elements, rank));
+  add_contact(comm, piece, part);
   LocalNumbers local(piece.owner.size());
   for (const int64_t row : own) local.of(row);
-  pick_springs(piece, local, rank, part);
-  pick_solid(piece, local, rank, part);
-  for (const model::TermElements& elements : model.elements)
-    part.model.elements.push_back(pick_elements(piece, elements, local, rank));
-  add_contact(comm, piece, local, part);
+  for_each_point(part.model, [&](int64_t& point) { point = local.of(point); });
   part.point_row = local.rows();
   pick_points(piece, part);
   part.point_row = pick(piece.point_row, part.point_row);

@@ -46,11 +46,10 @@ class JawAdhesion {
     const auto tooth = tree_.nearest(x[point], jaw_.reach * jaw_.reach);
     if (tooth.triangle < 0 || tooth.squared <= on_tooth * on_tooth) return;
     const Vec3 normal = (x[point] - tooth.point).normalized();
-    elements.points.push_back(point);
-    elements.numbers.insert(
-        elements.numbers.end(),
-        {normal.x(), normal.y(), normal.z(), normal.dot(x[point]), rule_.tension * pairs.area[pair],
-         rule_.range, static_cast<double>(jaw_.bone)});
+    elements.add(
+        std::array{point},
+        std::array{normal.x(), normal.y(), normal.z(), normal.dot(x[point]),
+                   rule_.tension * pairs.area[pair], rule_.range, static_cast<double>(jaw_.bone)});
   }
 
  private:

@@ -58,6 +58,14 @@ double sum(const std::vector<double>& values) {
   return std::accumulate(values.begin(), values.end(), 0.0);
 }
 
+/// The elements of a model's elastic supports; null where it has none.
+template <class AnyModel>
+auto* find_supports(AnyModel& model) {
+  const auto found =
+      std::ranges::find(model.elements, std::string("elastic_support"), &TermElements::term);
+  return found == model.elements.end() ? nullptr : &*found;
+}
+
 }  // namespace
 
 void add_supports(const ColumnEnds& ends, const scene::Material& material, const SkinMesh& mesh,
@@ -74,10 +82,9 @@ void add_supports(const ColumnEnds& ends, const scene::Material& material, const
         ends.support_stiffness[c] / sum(compliance.along(x.subspan(first, layers)));  // N/mm³
     for (size_t i = ends.supported_whole[c] ? first : deepest; i <= deepest; ++i) {
       if (model.points.set[i] != PointSet::soft_tissue) continue;
-      elements.points.push_back(static_cast<int64_t>(i));
-      elements.numbers.insert(elements.numbers.end(),
-                              {x[i].x(), x[i].y(), x[i].z(), stiffness * area[i],
-                               static_cast<double>(ends.support[c])});
+      elements.add(std::array{static_cast<int64_t>(i)},
+                   std::array{x[i].x(), x[i].y(), x[i].z(), stiffness * area[i],
+                              static_cast<double>(ends.support[c])});
     }
   }
   model.elements.push_back(std::move(elements));
@@ -85,9 +92,8 @@ void add_supports(const ColumnEnds& ends, const scene::Material& material, const
 
 std::vector<std::vector<double>> support_shares(const scene::Material& material,
                                                 const Model& model) {
-  const auto supports =
-      std::ranges::find(model.elements, std::string("elastic_support"), &TermElements::term);
-  if (supports == model.elements.end()) return {};
+  const TermElements* const supports = find_supports(model);
+  if (!supports) return {};
   const Points& points = model.points;
   std::map<int64_t, std::vector<double>> shares;  // by column
   for (const int64_t point : supports->points) shares[points.column[point]];
@@ -110,9 +116,8 @@ std::vector<std::vector<double>> support_shares(const scene::Material& material,
 }
 
 void share_supports(const std::vector<std::array<int64_t, 2>>& twins, Model& model) {
-  const auto supports =
-      std::ranges::find(model.elements, std::string("elastic_support"), &TermElements::term);
-  if (supports == model.elements.end()) return;
+  TermElements* const supports = find_supports(model);
+  if (!supports) return;
   const auto stiffness_of = [&](size_t e) -> double& {
     return supports->numbers[e * static_cast<size_t>(supports->numbers_each) + 3];
   };
@@ -123,8 +128,7 @@ void share_supports(const std::vector<std::array<int64_t, 2>>& twins, Model& mod
     stiffness_of(e) /= 2;
     const auto numbers = supports->numbers_of(e);
     const std::vector<double> shared(numbers.begin(), numbers.end());
-    supports->points.push_back(twin);
-    supports->numbers.insert(supports->numbers.end(), shared.begin(), shared.end());
+    supports->add(std::array{twin}, shared);
   }
 }
 

@@ -77,6 +77,11 @@ struct TermElements {
   int32_t bone_of(size_t e) const {
     return bone_number < 0 ? -1 : static_cast<int32_t>(numbers_of(e)[bone_number]);
   }
+  /// Appends an element, whose points and numbers lie elsewhere.
+  void add(std::span<const int64_t> of_points, std::span<const double> of_numbers) {
+    points.insert(points.end(), of_points.begin(), of_points.end());
+    numbers.insert(numbers.end(), of_numbers.begin(), of_numbers.end());
+  }
 };
 
 struct Model {
