@@ -29,11 +29,6 @@ std::string kind_of(const std::string& set, bool same_layers) {
   return same_layers ? set : set.substr(0, set.find(' '));
 }
 
-double length(const Model& model, size_t spring) {
-  const auto [p, q] = model.springs.points[spring];
-  return (model.points.position[q] - model.points.position[p]).norm();
-}
-
 std::map<std::string, Material> materials(const surface::Surface& skin, const Model& model,
                                           bool same_layers) {
   const std::vector<double> volumes =

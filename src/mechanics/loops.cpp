@@ -6,12 +6,6 @@ namespace repose::mechanics {
 
 namespace {
 
-template <size_t n>
-bool touches_soft_tissue(const model::Points& points, const std::array<int64_t, n>& element) {
-  return std::any_of(element.begin(), element.end(),
-                     [&](int64_t i) { return points.set[i] == model::PointSet::soft_tissue; });
-}
-
 /// Rows of elements of a part that a loop evaluates.
 struct Chosen {
   std::vector<int64_t> counted, others;
@@ -23,7 +17,7 @@ Chosen choose(const model::Model& part, const std::vector<std::array<int64_t, n>
               int64_t owned, Request&& requested, bool soft = true) {
   Chosen chosen;
   for (int64_t e = 0; e < static_cast<int64_t>(elements.size()); ++e)
-    if (requested(e) && touches_soft_tissue(part.points, elements[e]) == soft)
+    if (requested(e) && model::touches_soft_tissue(part.points, elements[e]) == soft)
       (e < owned ? chosen.counted : chosen.others).push_back(e);
   const auto first = [&](int64_t e) { return *std::ranges::min_element(elements[e]); };
   std::ranges::stable_sort(chosen.counted, {}, first);

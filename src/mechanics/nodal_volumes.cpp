@@ -137,9 +137,7 @@ void add_gradient(const std::array<int32_t, 6>& points, const PrismSlope<double>
 void add_prism(const model::Model& part, int64_t row, int64_t owned_prisms, NodalVolumes& nodal) {
   const model::Prisms& prisms = part.prisms;
   const double v0 = prisms.rest_volume[row], averaged = prisms.nodal_modulus[row];
-  const bool soft = std::ranges::any_of(prisms.points[row], [&](int64_t p) {
-    return part.points.set[p] == model::PointSet::soft_tissue;
-  });
+  const bool soft = model::touches_soft_tissue(part.points, prisms.points[row]);
   nodal.place[row] = static_cast<int64_t>(nodal.rest_volume.size());
   nodal.rest_volume.push_back(v0);
   nodal.own_stiffness.push_back((prisms.modulus[row] - averaged) / v0);

@@ -50,10 +50,7 @@ TermLoop::TermLoop(const model::TermElements& elements, const model::Points& poi
     for (size_t e = 0; e < elements.size(); ++e) {
       const auto of = elements.points_of(e);
       const auto numbers = elements.numbers_of(e);
-      const bool soft = std::any_of(of.begin(), of.end(), [&](int64_t p) {
-        return points.set[p] == model::PointSet::soft_tissue;
-      });
-      if (!soft || (of[0] < owned) != counts) continue;
+      if (!model::touches_soft_tissue(points, of) || (of[0] < owned) != counts) continue;
       points_.insert(points_.end(), of.begin(), of.end());
       numbers_.insert(numbers_.end(), numbers.begin(), numbers.end());
       bone_.push_back(elements.bone_of(e));

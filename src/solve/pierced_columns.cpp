@@ -193,9 +193,8 @@ void add_prisms(discrete::Objective& objective, bool bones, int32_t last, Pierce
     for (int64_t m = 0; m < part.owned_prisms; ++m) {
       const std::array<int64_t, 6> corners = from_the_top(points, part.model.prisms.points[m]);
       const std::array<Vec3, 6> now = base::pick(positions.local(), corners);
-      const bool free = std::ranges::any_of(
-          corners, [&](int64_t p) { return points.set[p] == model::PointSet::soft_tissue; });
-      if (!free || depth >= (now[1] - now[0]).norm()) continue;
+      if (!model::touches_soft_tissue(points, corners) || depth >= (now[1] - now[0]).norm())
+        continue;
       if (bones && points.layer[corners[3]] == last) continue;
       const bool at_skin = points.layer[corners[0]] == 0;
       const auto in = [&](const std::array<Vec3, 6>& x, const mechanics::RigidBody& body) {

@@ -26,11 +26,6 @@ namespace {
 
 constexpr double balanced = 1e-12;  // of the largest force before
 
-double length(const Model& model, size_t spring) {
-  const auto& [p, q] = model.springs.points[spring];
-  return (model.points.position[q] - model.points.position[p]).norm();
-}
-
 /// A prism's volume at the initial position and its derivatives.
 mechanics::PrismSlope<double> volume_slope(const Model& model, size_t prism) {
   return mechanics::PrismSlope(

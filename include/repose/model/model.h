@@ -1,4 +1,5 @@
 #pragma once
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <initializer_list>
@@ -102,6 +103,18 @@ struct Model {
 
 /// Returns whether the tissue is a neo-Hookean solid, not springs.
 inline bool is_solid(const Model& model) { return !model.prisms.modulus.empty(); }
+
+/// Returns the initial length of a spring, mm.
+inline double length(const Model& model, size_t spring) {
+  const auto& [p, q] = model.springs.points[spring];
+  return (model.points.position[q] - model.points.position[p]).norm();
+}
+
+/// Returns whether an element has a point of soft tissue.
+inline bool touches_soft_tissue(const Points& points, std::span<const int64_t> element) {
+  return std::any_of(element.begin(), element.end(),
+                     [&](int64_t row) { return points.set[row] == PointSet::soft_tissue; });
+}
 
 /// [N] of every point the outward unit normal of the skin above it, area-weighted, at the initial
 /// position; zero where there is no skin above.
