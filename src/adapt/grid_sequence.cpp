@@ -87,7 +87,6 @@ class SequenceSolver {
           fmt::format("a coarse model did not come to rest: {}", summary.last.reason);
       return false;
     }
-    level.unknowns = summary.unknowns;
     level.evaluations = summary.evaluations;
     level.assemblies = summary.assemblies;
     base::on_root(comm_, [&] { store(std::move(built), std::move(position), level); });

@@ -58,7 +58,7 @@ void check_options(PetscErrorCode code) {
   refuse("PETSc does not take an option's value: {}", text);
 }
 
-Session::Session(int argc, char** argv, const char* help) {
+Session::Session(int argc, char** argv) {
   set_mpi_variables();
   // With more, models are shared out over ranks in another way in every run (Scotch 7).
   setenv("SCOTCH_PTHREAD_NUMBER", "1", 0);
@@ -68,7 +68,7 @@ Session::Session(int argc, char** argv, const char* help) {
   std::array<struct sigaction, kept.size()> actions{};
   for (size_t k = 0; k < kept.size(); ++k) sigaction(kept[k], nullptr, &actions[k]);
   check(PetscPushErrorHandler(PetscReturnErrorHandler, nullptr));
-  if (const PetscErrorCode code = PetscInitialize(&argc, &argv, nullptr, help))
+  if (const PetscErrorCode code = PetscInitialize(&argc, &argv, nullptr, nullptr))
     refuse("PETSc does not start with its options (command line, -options_file, PETSC_OPTIONS): {}",
            text_of(code));
   // PETSc 3.22 lists unused options on standard output by default, even when Repose refuses one.

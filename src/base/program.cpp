@@ -79,7 +79,7 @@ int leave(const InputError& error) {
 int run_program(Options& options, const std::function<Exit()>& work) {
   std::optional<Session> session;
   try {
-    session.emplace(options.petsc_argc(), options.petsc_argv(), nullptr);
+    session.emplace(options.petsc_argc(), options.petsc_argv());
   } catch (const InputError& error) {
     return leave(error);
   }

@@ -100,7 +100,7 @@ int main(int argc, char** argv) {
     std::fprintf(stderr, "usage: benchmark_build_local SKIN_VERTICES FILE whole|raised\n");
     return 1;
   }
-  const base::Session session(1, argv, nullptr);
+  const base::Session session(1, argv);
   measure(std::stoll(argv[1]), argv[2], std::string(argv[3]) == "whole");
   return 0;
 }

@@ -120,7 +120,7 @@ int main(int argc, char** argv) {
     std::fprintf(stderr, "usage: benchmark_large SKIN_VERTICES FILE\n");
     return 1;
   }
-  const base::Session session(1, argv, nullptr);
+  const base::Session session(1, argv);
   measure(std::stoll(argv[1]), argv[2]);
   return 0;
 }

@@ -133,7 +133,7 @@ int main(int argc, char** argv) {
     std::fprintf(stderr, "usage: benchmark_scaling PAGE.md\n");
     return 1;
   }
-  const base::Session session(1, argv, nullptr);
+  const base::Session session(1, argv);
   const std::vector<surface::Surface> bones = {tools::phantom::make_phantom_skull(bone_edge),
                                                tools::phantom::make_phantom_mandible(bone_edge)};
   std::vector<Cost> costs;

@@ -46,7 +46,7 @@ Reader& reader() {
   static char program[] = "fuzz_coverage", no_signals[] = "-no_signal_handler";
   static char* arguments[] = {program, no_signals, nullptr};
   static const bool quiet = setenv("OMPI_MCA_opal_signal", "", 1) == 0;
-  static const base::Session session(quiet ? 2 : 1, arguments, nullptr);
+  static const base::Session session(quiet ? 2 : 1, arguments);
   const char* name = std::getenv("REPOSE_READER");
   static Reader one(name ? name : "");
   return one;

@@ -96,7 +96,7 @@ int run_all(uint64_t inputs, uint64_t seed, const std::string& only) {
 
 int main(int argc, char** argv) {
   char* no_arguments[] = {argv[0], nullptr};
-  const repose::base::Session session(1, no_arguments, nullptr);
+  const repose::base::Session session(1, no_arguments);
   const uint64_t inputs = argc > 1 ? std::strtoull(argv[1], nullptr, 10) : 2000;
   const uint64_t seed = argc > 2 ? std::strtoull(argv[2], nullptr, 10) : 1;
   return repose::fuzz::run_all(inputs, seed, argc > 3 ? argv[3] : "");

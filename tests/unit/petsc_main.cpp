@@ -4,6 +4,6 @@
 
 int main(int argc, char** argv) {
   ::testing::InitGoogleTest(&argc, argv);
-  repose::base::Session session(argc, argv, nullptr);
+  repose::base::Session session(argc, argv);
   return RUN_ALL_TESTS();
 }

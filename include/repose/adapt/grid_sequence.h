@@ -14,7 +14,7 @@ namespace repose::adapt {
 /// Work and error of one coarse model.
 struct Level {
   Resolution resolution;
-  int64_t points = 0, unknowns = 0;
+  int64_t points = 0;
   int64_t evaluations = 0, assemblies = 0;  ///< of the gradient and of the Hessian
   double seconds = 0;                       ///< wall, building included
   /// mm, largest distance of the skin's rest position from that of the level before, at the scene's

@@ -89,7 +89,7 @@ MPI_Comm comm_of(Object object) {
 /// return its errors instead of aborting, finalizes. Collective.
 class Session {
  public:
-  Session(int argc, char** argv, const char* help);
+  Session(int argc, char** argv);
   ~Session();
   Session(Session&&) = delete;
 };

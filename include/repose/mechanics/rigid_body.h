@@ -31,7 +31,6 @@ class RigidBody {
 
   int32_t bone() const { return bone_; }  ///< −1 for one that is pushed
   const Vec3& push() const { return push_; }
-  const Shape& shape() const { return *shape_; }
   void place(const Mat3& rotation, const Vec3& shift) {
     rotation_ = rotation;
     shift_ = shift;

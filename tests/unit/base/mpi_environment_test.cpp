@@ -94,7 +94,7 @@ int traces_of_a_session() {
   const int before = sockets();
   std::string name = "test";
   char* argv[] = {name.data(), nullptr};
-  const Session session(1, argv, nullptr);
+  const Session session(1, argv);
   return sockets() - before + (child_processes().empty() ? 0 : 1);
 }
 

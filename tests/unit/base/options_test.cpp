@@ -253,7 +253,7 @@ TEST(Options, ReadsPetscsDatabase) {
   const auto file = folder.write(
       "options.txt", "-accuracy 0.25\n-load_steps 7\n-dry_run\n-ksp_rtol 1e-3\n-functionl force\n");
   Line line({"head.yaml", "-load_steps", "9", "-pc_typo", "x", "-options_file", file.string()});
-  const Session session(line->petsc_argc(), line->petsc_argv(), nullptr);
+  const Session session(line->petsc_argc(), line->petsc_argv());
   EXPECT_NE(
       line.refusal().find("unknown option '-functionl'; the nearest known one is -functional"),
       std::string::npos)
