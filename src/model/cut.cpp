@@ -81,7 +81,7 @@ class CutSplitter {
   }
   /// The share of the left side in what a point (p = q) or a spring has.
   double left_share(int64_t p, int64_t q) const {
-    const auto& [right, left] = volume_.at({std::min(p, q), std::max(p, q)});
+    const auto& [right, left] = volume_.at(base::sorted_pair(p, q));
     return left / (left + right);
   }
 
@@ -138,16 +138,8 @@ class CutSplitter {
     return beyond;
   }
 
-  /// An edge at the border of a piece may have prisms on one side only, whose share is all.
-  void add_to_edge(int64_t p, int64_t q, double weight) {
-    Edges& edges = model_.edges;
-    const std::array<int64_t, 2> ends = {std::min(p, q), std::max(p, q)};
-    const auto edge = std::lower_bound(edges.points.begin(), edges.points.end(), ends);
-    if (edge != edges.points.end() && *edge == ends)
-      edges.weight[edge - edges.points.begin()] += weight;
-  }
-
-  /// The edges of the parted prisms, with what else they carried.
+  /// The edges of the parted prisms, with what else they carried. An edge at the border of a piece
+  /// may have prisms on one side only, whose share is all.
   void part_edges(const Edges& before, const std::vector<double>& beyond) {
     if (!is_solid(model_)) return;
     assemble_edges("", model_);
@@ -155,12 +147,12 @@ class CutSplitter {
       auto [p, q] = before.points[j];
       if (in_cut(p, q)) {
         const double share = left_share(p, q);
-        add_to_edge(p, q, (1 - share) * beyond[j]);
-        add_to_edge(double_of(p), double_of(q), share * beyond[j]);
+        add_to_edge(p, q, (1 - share) * beyond[j], model_.edges);
+        add_to_edge(double_of(p), double_of(q), share * beyond[j], model_.edges);
         continue;
       }
       move_to_side(p, q);
-      add_to_edge(p, q, beyond[j]);
+      add_to_edge(p, q, beyond[j], model_.edges);
     }
   }
 

@@ -137,7 +137,7 @@ class PathCutter {
   int64_t on_edge(int64_t a, int64_t b, double w) {
     if (w < snap) return a;
     if (w > 1 - snap) return b;
-    if (edges_.contains({std::min(a, b), std::max(a, b)})) refuse_meeting(mesh_.point(a));
+    if (edges_.contains(base::sorted_pair(a, b))) refuse_meeting(mesh_.point(a));
     return mesh_.split_edge(a, b, (1 - w) * mesh_.point(a) + w * mesh_.point(b));
   }
 
@@ -158,8 +158,7 @@ class PathCutter {
       refuse("the path reaches the rim of the skin near {}; keep it inside",
              format_point(mesh_.point(vertex)));
     if (!taken_.insert(vertex).second) refuse_meeting(mesh_.point(vertex));
-    if (!chain_.empty())
-      edges_.insert({std::min(chain_.back(), vertex), std::max(chain_.back(), vertex)});
+    if (!chain_.empty()) edges_.insert(base::sorted_pair(chain_.back(), vertex));
     chain_.push_back(vertex);
   }
 

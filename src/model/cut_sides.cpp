@@ -23,7 +23,7 @@ int64_t corner(const Triangle& t, int64_t vertex, int steps) {
 CutSides::CutSides(const std::vector<int64_t>& columns, const std::vector<Triangle>& triangles) {
   std::map<int64_t, std::vector<int64_t>> around;
   for (size_t i = 0; i + 1 < columns.size(); ++i) {
-    cut_edges_.insert({std::min(columns[i], columns[i + 1]), std::max(columns[i], columns[i + 1])});
+    cut_edges_.insert(base::sorted_pair(columns[i], columns[i + 1]));
     if (i > 0) parted_.insert(columns[i]);
   }
   for (size_t row = 0; row < triangles.size(); ++row)
@@ -34,7 +34,7 @@ CutSides::CutSides(const std::vector<int64_t>& columns, const std::vector<Triang
 }
 
 bool CutSides::in_cut(int64_t a, int64_t b) const {
-  return cut_edges_.contains({std::min(a, b), std::max(a, b)});
+  return cut_edges_.contains(base::sorted_pair(a, b));
 }
 
 bool CutSides::left_edge(int64_t vertex, int64_t other) const {

@@ -143,14 +143,11 @@ double skin_tension(const scene::Tissue& tissue, const std::string& file) {
 
 void add_skin_tension(double tension, Model& model) {
   const std::vector<Vec3>& x = model.points.position;
-  Edges& edges = model.edges;
   for (const Triangle& t : model.skin)
     for (int corner = 0; corner < 3; ++corner) {
       const int64_t p = t[(corner + 1) % 3], q = t[(corner + 2) % 3];
       const Vec3 a = x[p] - x[t[corner]], b = x[q] - x[t[corner]];
-      const std::array<int64_t, 2> ends = {std::min(p, q), std::max(p, q)};
-      const auto edge = std::lower_bound(edges.points.begin(), edges.points.end(), ends);
-      edges.weight[edge - edges.points.begin()] += tension * a.dot(b) / a.cross(b).norm() / 2;
+      add_to_edge(p, q, tension * a.dot(b) / a.cross(b).norm() / 2, model.edges);
     }
 }
 
@@ -231,6 +228,13 @@ void assemble_edges(const std::string& file, Model& model) {
       model.edges.weight.push_back(weight);
     }
   }
+}
+
+void add_to_edge(int64_t p, int64_t q, double weight, Edges& edges) {
+  const auto ends = base::sorted_pair(p, q);
+  const auto edge = std::ranges::lower_bound(edges.points, ends);
+  if (edge != edges.points.end() && *edge == ends)
+    edges.weight[edge - edges.points.begin()] += weight;
 }
 
 std::vector<int64_t> skin_rows(const Points& points) {

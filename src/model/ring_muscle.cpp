@@ -99,7 +99,7 @@ void add_tone(const RingMuscle& muscle, const std::vector<int64_t>& row, int64_t
             .value();
     for (size_t k = 0; k < weights.size(); ++k) {
       const int64_t p = points[prism_pairs[k][0]], q = points[prism_pairs[k][1]];
-      added[{std::min(p, q), std::max(p, q)}] += weights[k];
+      added[base::sorted_pair(p, q)] += weights[k];
       const Vec3 pull = weights[k] * (X[q] - X[p]);
       force[p] -= pull;
       force[q] += pull;
@@ -107,7 +107,7 @@ void add_tone(const RingMuscle& muscle, const std::vector<int64_t>& row, int64_t
   }
   for (size_t j = 0; j < model.edges.points.size(); ++j) {
     const auto [p, q] = model.edges.points[j];
-    const auto weight = added.find({std::min(p, q), std::max(p, q)});
+    const auto weight = added.find(base::sorted_pair(p, q));
     if (weight != added.end()) model.edges.weight[j] += weight->second;
   }
   for (int64_t i = 0; i < owned; ++i)

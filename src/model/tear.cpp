@@ -8,14 +8,13 @@
 namespace repose::model {
 namespace {
 
+using base::sorted_pair;
 using Edge = std::array<int64_t, 2>;
-
-Edge sorted(int64_t p, int64_t q) { return {std::min(p, q), std::max(p, q)}; }
 
 std::set<Edge> torn_edges(const std::vector<char>& torn, const Springs& springs) {
   std::set<Edge> edges;
   for (size_t j = 0; j < torn.size(); ++j)
-    if (torn[j]) edges.insert(sorted(springs.points[j][0], springs.points[j][1]));
+    if (torn[j]) edges.insert(sorted_pair(springs.points[j][0], springs.points[j][1]));
   return edges;
 }
 
@@ -43,16 +42,17 @@ void keep(Group& group, const std::vector<char>& gone) {
 bool has_torn_edge(const std::array<int64_t, 6>& p, const std::set<Edge>& edges) {
   for (int c = 0; c < 3; ++c) {
     const int d = (c + 1) % 3;
-    if (edges.contains(sorted(p[c], p[d])) || edges.contains(sorted(p[c + 3], p[d + 3])) ||
-        edges.contains(sorted(p[c], p[c + 3])))
+    if (edges.contains(sorted_pair(p[c], p[d])) ||
+        edges.contains(sorted_pair(p[c + 3], p[d + 3])) ||
+        edges.contains(sorted_pair(p[c], p[c + 3])))
       return true;
   }
   return false;
 }
 
 bool has_torn_edge(const Triangle& t, const std::set<Edge>& edges) {
-  return edges.contains(sorted(t[0], t[1])) || edges.contains(sorted(t[1], t[2])) ||
-         edges.contains(sorted(t[2], t[0]));
+  return edges.contains(sorted_pair(t[0], t[1])) || edges.contains(sorted_pair(t[1], t[2])) ||
+         edges.contains(sorted_pair(t[2], t[0]));
 }
 
 int64_t remove_prisms(const std::set<Edge>& edges, Prisms& prisms) {

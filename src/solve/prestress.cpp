@@ -95,7 +95,7 @@ discrete::Part solid_stiffness_part(discrete::Part part) {
     const double young = model::young_modulus({shear, model.prisms.modulus[m]});
     for (const auto& [a, b] : model::prism_pairs) {
       const int64_t p = model.prisms.points[m][a], q = model.prisms.points[m][b];
-      share[{std::min(p, q), std::max(p, q)}] += young * model.prisms.rest_volume[m] / pairs;
+      share[base::sorted_pair(p, q)] += young * model.prisms.rest_volume[m] / pairs;
     }
     model.prisms.modulus[m] = lame + 2 * shear / 3;
   }
@@ -109,7 +109,7 @@ discrete::Part solid_stiffness_part(discrete::Part part) {
   springs.reference.assign(count, 1);
   for (size_t j = 0; j < count; ++j) {
     const auto [p, q] = springs.points[j];
-    const auto energy = share.find({std::min(p, q), std::max(p, q)});
+    const auto energy = share.find(base::sorted_pair(p, q));
     springs.rest_length.push_back(length(model, j));
     springs.stiffness.push_back(
         energy == share.end() ? 0 : energy->second / std::pow(springs.rest_length[j], 2));

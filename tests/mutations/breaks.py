@@ -347,8 +347,8 @@ BREAKS = [
     ),
     (
         "edges at a cut",
-        "add_to_edge(p, q, (1 - share) * beyond[j]);",
-        "add_to_edge(p, q, share * beyond[j]);",
+        "add_to_edge(p, q, (1 - share) * beyond[j], model_.edges);",
+        "add_to_edge(p, q, share * beyond[j], model_.edges);",
         f"{MODEL}cut",
     ),
     (

@@ -52,6 +52,11 @@ void sort_unique(std::vector<T>& values) {
   values.erase(std::unique(values.begin(), values.end()), values.end());
 }
 
+/// Two numbers in order, as one key.
+inline std::array<int64_t, 2> sorted_pair(int64_t p, int64_t q) {
+  return {std::min(p, q), std::max(p, q)};
+}
+
 /// 0, 1, … up to `count`.
 inline std::vector<int64_t> all_rows(size_t count) {
   std::vector<int64_t> rows(count);

@@ -83,6 +83,8 @@ std::vector<int64_t> set_material(const scene::Tissue& tissue, const std::string
 /// The edges again from the prisms and their shear moduli, sorted by their points. InputError as
 /// above. Serial, O(prisms).
 void assemble_edges(const std::string& file, Model& model);
+/// Adds to the weight of the edge between two points; nothing where there is none.
+void add_to_edge(int64_t p, int64_t q, double weight, Edges& edges);
 
 /// The ring muscle of the mouth (orbicularis oris), by landmarks.
 struct RingMuscle {
