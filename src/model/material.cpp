@@ -41,17 +41,12 @@ Vec3 middle_of(const std::array<Vec3, 6>& corners) {
   return std::accumulate(corners.begin(), corners.end(), Vec3(Vec3::Zero())) / 6;
 }
 
-/// The means of the strata between two depths.
-Moduli mean_moduli(const scene::Material& material, const std::array<double, 2>& depth) {
-  std::vector<double> thickness;
-  for (const scene::Stratum& stratum : material.strata) thickness.push_back(stratum.thickness);
-  const std::vector<double> share = strata_shares(thickness, depth);
+/// The means of the moduli of strata by their shares.
+Moduli mean_moduli(const std::vector<Moduli>& strata, const std::vector<double>& share) {
   Moduli mean{0, 0};
   for (size_t s = 0; s < share.size(); ++s) {
-    const Moduli here =
-        moduli(s < material.strata.size() ? material.strata[s].elasticity : material.deep);
-    mean.shear += share[s] * here.shear;
-    mean.volume += share[s] * here.volume;
+    mean.shear += share[s] * strata[s].shear;
+    mean.volume += share[s] * strata[s].volume;
   }
   return mean;
 }
@@ -59,6 +54,22 @@ Moduli mean_moduli(const scene::Material& material, const std::array<double, 2>&
 void set_moduli(const Moduli& here, size_t prism, Prisms& prisms) {
   prisms.shear_modulus[prism] = here.shear;
   prisms.modulus[prism] = here.volume;
+}
+
+/// Gives every prism the means of the strata that it crosses.
+void set_strata_moduli(const scene::Material& material, const std::vector<int64_t>& skin,
+                       Model& model) {
+  std::vector<double> thickness;
+  std::vector<Moduli> strata;
+  for (const scene::Stratum& stratum : material.strata) {
+    thickness.push_back(stratum.thickness);
+    strata.push_back(moduli(stratum.elasticity));
+  }
+  strata.push_back(moduli(material.deep));
+  for (size_t m = 0; m < model.prisms.points.size(); ++m) {
+    const std::array<double, 2> depth = depth_of(model, model.prisms.points[m], skin);
+    set_moduli(mean_moduli(strata, strata_shares(thickness, depth)), m, model.prisms);
+  }
 }
 
 /// Calls visit(prism) for each prism whose middle a region holds; `skin` [points] is the row of the
@@ -263,11 +274,8 @@ std::vector<int64_t> set_material(const scene::Tissue& tissue, const std::string
   const size_t count = prisms.points.size();
   prisms.shear_modulus.resize(count);
   prisms.modulus.resize(count);
-  std::vector<int64_t> skin;
-  for (size_t i = 0; i < model.points.layer.size(); ++i)
-    skin.push_back(static_cast<int64_t>(i) - model.points.layer[i]);
-  for (size_t m = 0; m < count; ++m)
-    set_moduli(mean_moduli(material, depth_of(model, prisms.points[m], skin)), m, prisms);
+  const std::vector<int64_t> skin = skin_rows(model.points);
+  set_strata_moduli(material, skin, model);
   std::vector<int64_t> found = set_region_moduli(material, skin, model);
   if (material.dilatation == scene::Dilatation::nodal)
     for (size_t m = 0; m < count; ++m)
