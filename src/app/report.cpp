@@ -13,12 +13,6 @@ std::string report_row(const std::string& name, const std::string& value) {
 
 namespace {
 
-/// Describes how repeated searches ended.
-std::string ending(bool settled, bool stopped, const std::string& unsettled) {
-  if (settled) return "settled";
-  return unsettled + (stopped ? ", STOPPED BY A SIGNAL OR THE TIME LIMIT" : "");
-}
-
 /// Why many load steps of a run that came to its end were halved, and what to change.
 std::string describe_halvings(const solve::Halvings& h, bool springs) {
   constexpr int64_t usual = 4;
@@ -239,11 +233,12 @@ std::string describe_contact(const std::vector<std::string>& bodies, const solve
 
 std::string describe_tearing(const solve::Tearing& t) {
   if (!t.limit) return "";
+  const char* const stopped = t.stopped ? ", STOPPED BY A SIGNAL OR THE TIME LIMIT" : "";
   std::string text = report_row(
       "tearing",
-      "{}, rounds: {}, limit {:g} N, largest tension at loaded points and tears "
-      "{:.4g} N",
-      ending(t.settled, t.stopped, "NOT SETTLED, MORE MAY TEAR"), t.rounds, *t.limit, t.largest);
+      "{}{}, rounds: {}, limit {:g} N, largest tension at loaded points and tears {:.4g} N",
+      t.settled ? "settled" : "NOT SETTLED, MORE MAY TEAR", t.settled ? "" : stopped, t.rounds,
+      *t.limit, t.largest);
   if (t.springs == 0) return text + report_row("torn", "nothing");
   return text + report_row("torn",
                            "springs {}, with them prisms {} and triangles of the skin "

@@ -100,13 +100,10 @@ void choose_coarse(const CoarseRequest& request, const std::string& conflict, co
 
 /// Refuses what minimizes without regard to contact.
 void require_contact_kept(const Strategy& s, const Job& job) {
-  if (!job.local_model.part.contact) return;
-  const char* remedy = "leave contact and sliding instruments out of the scene";
-  if (is_force(s))
+  if (job.local_model.part.contact && is_force(s))
     base::refuse(
         "functional force does not keep tissue out of what it touches; choose functional energy, "
-        "or {}",
-        remedy);
+        "or leave contact and sliding instruments out of the scene");
 }
 
 /// Refuses to verify a path that is not a matter of load steps.
