@@ -15,8 +15,7 @@ void Reply::add(const std::string& name, const std::vector<Vec3>& rows) {
   flat.reserve(3 * rows.size());
   for (const Vec3& row : rows)
     for (int a = 0; a < 3; ++a) flat.push_back(static_cast<float>(row[a]));
-  append(name, "f4", {static_cast<int64_t>(rows.size()), 3}, flat.data(),
-         flat.size() * sizeof(float));
+  add(name, flat, 3);
 }
 
 void Reply::add(const std::string& name, const std::vector<double>& values) {
@@ -29,8 +28,7 @@ void Reply::add(const std::string& name, const std::vector<Triangle>& triangles)
   flat.reserve(3 * triangles.size());
   for (const Triangle& t : triangles)
     for (const int64_t corner : t) flat.push_back(static_cast<int32_t>(corner));
-  append(name, "i4", {static_cast<int64_t>(triangles.size()), 3}, flat.data(),
-         flat.size() * sizeof(int32_t));
+  add(name, flat, 3);
 }
 
 void Reply::refuse(const std::string& error) {

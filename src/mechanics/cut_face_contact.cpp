@@ -128,8 +128,7 @@ void CutFaceContact::link(const Net& own, const Net& other) {
     for (const Net* net : {&own, &other})
       for (int row = 0; row < own.rows; ++row)
         for (const auto& [p, share] : net->controls[c * own.rows + row]) points[c].push_back(p);
-    std::ranges::sort(points[c]);
-    points[c].erase(std::ranges::unique(points[c]).begin(), points[c].end());
+    base::sort_unique(points[c]);
   }
   for (int c = 0; c < own.columns; ++c)
     for (int d = std::max(0, c - reach); d < std::min(own.columns, c + reach + 1); ++d)
