@@ -73,12 +73,6 @@ Halves halves(const Vec3& v) {
   return two;
 }
 
-void add(const Halves& h, Vec3& sum) {
-  const Pair xy = halves(sum).xy + h.xy;
-  std::memcpy(sum.data(), &xy, sizeof xy);
-  sum.z() += h.z;
-}
-
 /// The edges of one first point after the other: its sum stays in registers.
 double edge_gradient(const EdgeLoop& loop, const Section& rows, std::span<const Vec3> position,
                      double scale, std::span<Vec3> gradient) {
@@ -93,11 +87,11 @@ double edge_gradient(const EdgeLoop& loop, const Section& rows, std::span<const 
       const Halves d = {there.xy - here.xy, there.z - here.z};
       const double w = loop.weight[e];
       const Halves force = {scale * w * d.xy, scale * w * d.z};
-      add(force, gradient[j]);
+      add_halves(force.xy, force.z, gradient[j]);
       sum = {sum.xy - force.xy, sum.z - force.z};
       squares = {squares.xy + w * d.xy * d.xy, squares.z + w * d.z * d.z};
     }
-    add(sum, gradient[i]);
+    add_halves(sum.xy, sum.z, gradient[i]);
   }
   return 0.5 * (squares.xy[0] + squares.xy[1] + squares.z);
 }

@@ -1,6 +1,4 @@
 #pragma once
-#include <cstring>
-
 #include "repose/mechanics/nodal_volumes.h"
 #include "repose/mechanics/prism_volume.h"
 
@@ -85,18 +83,10 @@ class TwoStacks {
     const Vec3 &a = values[point_[0][c]], &b = values[point_[1][c]];
     return {Pair{a.x(), b.x()}, Pair{a.y(), b.y()}, Pair{a.z(), b.z()}};
   }
-  /// Loads and stores x and y as one, always: a load that spans two stores waits for both.
-  static void add(Pair xy, double z, Vec3& sum) {
-    Pair sum_xy;
-    std::memcpy(&sum_xy, sum.data(), sizeof sum_xy);
-    sum_xy += xy;
-    std::memcpy(sum.data(), &sum_xy, sizeof sum_xy);
-    sum.z() += z;
-  }
   void add(int64_t c, const Triple<Pair>& force, std::span<Vec3> sums) const {
-    add(Pair{force.x[0], force.y[0]}, force.z[0], sums[point_[0][c]]);
+    add_halves(Pair{force.x[0], force.y[0]}, force.z[0], sums[point_[0][c]]);
     if (count_ == 1) return;
-    add(Pair{force.x[1], force.y[1]}, force.z[1], sums[point_[1][c]]);
+    add_halves(Pair{force.x[1], force.y[1]}, force.z[1], sums[point_[1][c]]);
   }
 
   int count_;

@@ -1,4 +1,6 @@
 #pragma once
+#include <cstring>
+
 #include "repose/base/geometry.h"
 
 /// Vectors of three for the kernels whose scalar is a number, or a pair of numbers of two elements
@@ -29,6 +31,16 @@ struct Triple {
     return {s * a.x, s * a.y, s * a.z};
   }
 };
+
+/// Adds to a vector. Loads and stores x and y as one, always: a load that spans two stores waits
+/// for both.
+inline void add_halves(Pair xy, double z, Vec3& sum) {
+  Pair sum_xy;
+  std::memcpy(&sum_xy, sum.data(), sizeof sum_xy);
+  sum_xy += xy;
+  std::memcpy(sum.data(), &sum_xy, sizeof sum_xy);
+  sum.z() += z;
+}
 
 inline Triple<double> triple(const Vec3& v) { return {v.x(), v.y(), v.z()}; }
 inline Vec3 vec3(const Triple<double>& t) { return {t.x, t.y, t.z}; }
