@@ -91,9 +91,8 @@ std::vector<base::Option> run_options() {
        "Build and report the model and how it would be solved; solve nothing. With -output, write "
        "NAME_solved_skin.ply, and where it is cut NAME_incisions.mrk.json."},
       {"restart", OptionKind::path, "",
-       "Go on from the last step of this result of the same model. Where other arrays than the "
-       "points "
-       "differ, a warning says which, and its state is where the search begins."},
+       "Resume from the last step of this result of the same model. Where other arrays than the "
+       "points differ, a warning says which, and its state is where the search begins."},
       {.name = "checkpoint_interval",
        .kind = OptionKind::number,
        .default_text = "",

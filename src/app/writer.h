@@ -41,7 +41,8 @@ class Writer {
 
   bool makes_checkpoints() const { return checkpoints_.interval > 0; }
   const std::string& unsettled() const { return unsettled_; }
-  /// Returns the estimated discretization error of the skin, on rank 0.
+  /// Row of the summary about the discretization error, where coarser models are compared; on rank
+  /// 0.
   const std::string& comparison() const { return comparison_; }
   /// mm, estimate of the last step; negative without one. On rank 0.
   double discretization_error() const {

@@ -7,7 +7,7 @@ namespace repose::discrete {
 struct RankColumns {
   model::Piece piece;
   std::vector<int> owner;        ///< [C] rank of each column
-  std::vector<int64_t> place;    ///< [C] of its first point, as in Distribution
+  std::vector<int64_t> place;    ///< [C] of its first point, as Piece::place
   std::vector<int64_t> unknown;  ///< [C] block number of its first unknown
   UnknownBlocks unknowns;
   int64_t layers = 0, columns = 0, triangles = 0, edges = 0;  ///< of the whole
