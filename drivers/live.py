@@ -164,6 +164,7 @@ class Handler(http.server.BaseHTTPRequestHandler):
         if request.get("points", "skin") == "skin":
             session.count_answer(request["plan"], head, arrays["position"], request.get("accuracy"))
             head["angles"] = self.server.angles.of(arrays["position"])
+            head["cautions"] = [sentence(*one) for one in cautions(head.get("summary", "").splitlines())]
         return packed(head, arrays)
 
     def notice(self):
@@ -183,25 +184,19 @@ class Handler(http.server.BaseHTTPRequestHandler):
 
     def result(self, request):
         with self.server.writing:
-            return self.written(".h5", self.write(request["plan"]))
-
-    def write(self, plan):
-        """Writes the result of a plan. Returns the lines of its summary."""
-        return self.server.session.write(self.server.output, plan).splitlines()
-
-    def written(self, ending, lines):
-        """Returns the name of the file written, and a line for each warning of its summary."""
-        return "\n".join([f"{self.server.output}{ending}", *(sentence(*one) for one in cautions(lines))]).encode()
+            self.server.session.write(self.server.output, request["plan"])
+        return f"{self.server.output}.h5".encode()
 
     def report(self, request):
         """Writes the result and its planning sheet."""
         with self.server.writing:
-            name, lines = self.server.output, self.write(request["plan"])
+            name = self.server.output
+            self.server.session.write(name, request["plan"])
             done = subprocess.run([sys.executable, HERE / "report.py", name, "-output", f"{name}.html", "-scene",
                                    self.server.scene], capture_output=True, text=True)
         if done.returncode != 0:
             raise ValueError(done.stderr.strip().splitlines()[-1] if done.stderr.strip() else "report.py failed")
-        return self.written(".html", lines)
+        return f"{name}.html".encode()
 
     def log_message(self, *_):
         pass

@@ -234,7 +234,7 @@ class Planner {
     this.placeHandle();
     this.showNumbers();
     moveBones(this.bones, this.plan, this.centroids);
-    byId("under").textContent = byId("written").textContent = "";
+    for (const id of ["under", "written", "cautions"]) byId(id).textContent = "";
     byId("angles").style.visibility = "hidden";
     this.preview();
     this.solveSoon();
@@ -314,7 +314,7 @@ class Planner {
     const number = ++this.asked, plan = copyOf(this.plan);
     const current = () => number === this.asked && isSame(plan, this.plan);
     try {
-      const answer = await ask("/solve", {plan, tangents});
+      const answer = await ask("/solve", {plan, tangents, summary: tangents});
       if (!answer.byteLength) {  // overtaken by another plan, of this window or of another one
         if (current()) this.timer = setTimeout(() => this.solve(tangents), 1000 * (1 + Math.random()));
         return;
@@ -328,8 +328,10 @@ class Planner {
       byId("angles").style.visibility = "visible";
       byId("angles").textContent = (head.angles ?? []).map(({name, before, after}) =>
         `${name} ${after.toFixed(1)}° (before ${before.toFixed(1)}°)`).join("; ");
+      byId("cautions").textContent = head.cautions.join("\n");
+      const warnings = head.cautions.length ? `, warnings: ${head.cautions.length}` : "";
       if (!head.converged) this.mark("failed", `not converged: ${head.reason}`);
-      else this.mark("exact", `exact to ${Math.max(head.error, 0.001).toFixed(3)} mm`);
+      else this.mark("exact", `exact to ${Math.max(head.error, 0.001).toFixed(3)} mm${warnings}`);
       if (!tangents) this.timer = setTimeout(() => this.solve(true), 150);
     } catch (error) {
       if (current()) this.mark("failed", error.message);

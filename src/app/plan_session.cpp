@@ -97,6 +97,7 @@ struct PlanSession::State {
   Base* base(const Placements& placements, const std::function<bool()>& abandoned);
   void precondition(Base& base);
   solve::Start start_at(const Base& base, const Placements& placements) const;
+  std::string describe(const SolvedSkin& skin, const std::vector<Vec3>& now);
 };
 
 void PlanSession::State::require_inside(const Placements& placements) const {
@@ -198,6 +199,19 @@ solve::Start PlanSession::State::start_at(const Base& base, const Placements& pl
   return start;
 }
 
+/// Describes the last answer, whose skin has the points `now`. Collective; on rank 0.
+std::string PlanSession::State::describe(const SolvedSkin& skin, const std::vector<Vec3>& now) {
+  const auto& [plan, accuracy, numbers, rows, summary] = *last;
+  std::string text = describe_folds(comm, part(), numbers.inverted_prisms, rows.volume_ratio);
+  base::on_root(comm, [&] {
+    model::Anatomy& anatomy = *job.anatomy;
+    anatomy.move_warnings = model::describe_overlaps_at_end(anatomy.bones, anatomy.scene);
+    text = describe_answer(job, skin, now, summary, -1) + text + describe_failure(job, summary) +
+           describe_touching(job, skin, now, summary);
+  });
+  return text;
+}
+
 PlanSession::PlanSession(MPI_Comm comm, const std::filesystem::path& input,
                          const scene::SceneChanges& changes)
     : state_(std::make_unique<State>()) {
@@ -280,6 +294,10 @@ PlanSession::Answer PlanSession::solve(const Request& request) {
     answer.field.back().values = base::gather(s.comm, field.values);
   }
   s.last = std::move(solved);
+  if (request.described) {
+    const SolvedSkin skin(s.comm, s.job);
+    answer.description = s.describe(skin, skin.points_at(s.last->rows.position));
+  }
   return answer;
 }
 
@@ -291,26 +309,21 @@ bool PlanSession::has_solved(const Placements& plan, double accuracy) const {
 std::string PlanSession::write(const std::filesystem::path& name) {
   State& s = *state_;
   if (!s.last) base::refuse("there is no solved plan to write; solve one first");
-  const auto& [plan, accuracy, numbers, rows, summary] = *s.last;
-  s.take(plan);
+  const Solved& last = *s.last;
+  s.take(last.plan);
   std::optional<results::NameLock> lock;
   base::on_root(s.comm, [&] { lock.emplace(name); });
   results::ResultFile file(s.comm, name, s.job.local_model.global_metadata,
                            discrete::NaturalRows::of_model(s.comm, s.job.local_model));
-  file.append(numbers, rows);
+  file.append(last.numbers, last.rows);
   file.commit();
   const std::string result = name.string() + ".h5";
   const SolvedSkin skin(s.comm, s.job);
-  const std::vector<Vec3> now = skin.points_at(rows.position);
-  std::string text =
-      describe_folds(s.comm, s.job.local_model.part, numbers.inverted_prisms, rows.volume_ratio);
+  const std::vector<Vec3> now = skin.points_at(last.rows.position);
+  std::string text = s.describe(skin, now);
   const std::string given = write_given_skin(s.comm, s.job, name.string(), skin, now);
   base::on_root(s.comm, [&] {
-    model::Anatomy& anatomy = *s.job.anatomy;
-    anatomy.move_warnings = model::describe_overlaps_at_end(anatomy.bones, anatomy.scene);
-    text = describe_answer(s.job, skin, now, summary, -1) + text +
-           describe_failure(s.job, summary) + describe_touching(s.job, skin, now, summary) +
-           report_row("result", "{}, {}_*.xdmf (ParaView)", result, name.string()) + given;
+    text += report_row("result", "{}, {}_*.xdmf (ParaView)", result, name.string()) + given;
     const std::string refused = results::add_summary(result, text);
     if (!refused.empty()) text += report_row("warning", "{}", refused);
   });

@@ -151,6 +151,7 @@ const std::vector<VerbMembers>& verbs() {
         {"gradient_of", read_gradient_of},
         {"base", read_base},
         {"other_rest", read_other_rest},
+        {"summary", [](const json& value, Request& r) { r.summary = read_flag(value, "summary"); }},
         {"points", read_points}}},
       {"change",
        Verb::change,

@@ -30,6 +30,7 @@ struct Request {
   bool from_rest = false;         ///< the search begins at the state before the bones move, …
   std::optional<PlanMoves> base;  ///< … or at this plan, else at the scene's
   bool other_rest = false;        ///< searched for where contact allows several; implies from_rest
+  bool summary = false;           ///< the answer has the summary of its face
   bool all_points = false;        ///< the answer has all points, not those of the skin alone
   scene::SceneChanges changes;    ///< in place of those before
   std::string output;             ///< path of the result without ending

@@ -275,6 +275,7 @@ void Service::solve(const Request& request, Reply& reply) {
   const PlanSession::Placements from = request.base ? place(*request.base) : scenes_plan();
   if (!request.from_rest) requested.base = &from;
   requested.other_rest = request.other_rest;
+  requested.described = request.summary;
   requested.abandoned = [this] { return requests_->superseded(ends_a_solve); };
   const double before = base::cpu_seconds();
   const PlanSession::Answer answer = session_->solve(requested);
@@ -287,6 +288,7 @@ void Service::solve(const Request& request, Reply& reply) {
   head["evaluations"] = answer.summary.evaluations;
   head["from_base"] = answer.from_base;
   if (request.other_rest) head["other_rest"] = write_other_rest(path.last);
+  if (request.summary) head["summary"] = answer.description;
   head["seconds"] = base::cpu_seconds() - before;
   if (answer.summary.gradient) head["gradient"] = write_gradient(*answer.summary.gradient);
   if (base::rank(comm_) == 0) add_arrays(answer, request.all_points, reply);

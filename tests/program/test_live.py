@@ -238,8 +238,10 @@ def test_a_full_result_passes_the_check(session, run, tmp_path):
 
 
 def test_a_full_result_holds_a_summary_of_its_own_plan(session, tmp_path):
-    session.solve({"chin": {"translate": [0, 0, 6]}})
-    rows = session.write(tmp_path / "deep").splitlines()
+    face = session.solve({"chin": {"translate": [0, 0, 6]}}, summary=True)
+    written = session.write(tmp_path / "deep")
+    assert written.startswith(face.summary), "answered as written"
+    rows = written.splitlines()
     told = [row.split(maxsplit=1) for row in rows]
     assert any(row[0] == "warning" and "'mandible' and 'chin' end" in row[1] for row in told), rows
     assert any(row[0] == "contact" for row in told), rows

@@ -130,6 +130,23 @@ unpack = buffer => {
   found.missing = seen();
   return found;
 })()"""
+WARNED = """
+(async () => {
+  const found = {}, told = () => document.getElementById("cautions").textContent;
+  while (!window.planner || !planner.reference) await sleep(30);
+  const type = async value => {
+    planner.inputs[1].value = value;
+    planner.inputs[1].dispatchEvent(new Event("change"));
+    found.soon = told();
+    await exact();
+    while (planner.reference.plan.chin.translate[2] !== value) await sleep(30);
+  };
+  await type(6);
+  await exact();
+  found.mark = mark().textContent;
+  found.told = told().split("\\n");
+  return found;
+})()"""
 VIEWS = """
 (async () => {
   const found = {}, show = mode => {
@@ -315,12 +332,11 @@ def browsed(live, served, script, size):
     return found
 
 
-def test_a_written_result_warns_of_what_its_summary_warns_of(served, monkeypatch):
-    server, address = served
-    told = "SKIN PASSES THROUGH SKIN: 2 of its triangles, one at (1, 2, 3) mm"
-    monkeypatch.setattr(server.session, "write", lambda *_: f"{'accuracy':24} 0.1 mm\n{'self-contact':24} {told}\n")
-    code, lines = status(address, "/result", {"X-Token": server.token}, b'{"plan": {}}')
-    assert (code, lines.decode().splitlines()) == (200, [f"{server.output}.h5", f"Self-contact: {told}."])
+def test_an_exact_face_has_the_warnings_of_its_summary(live, served):
+    found = browsed(live, served, WARNED, "1200,900")
+    assert found["mark"].endswith(f", warnings: {len(found['told'])}")
+    assert any("'mandible' and 'chin' end" in line and line.endswith(".") for line in found["told"]), found
+    assert found["soon"] == ""
 
 
 def test_a_face_of_the_former_plan_is_marked_as_such(live, served):

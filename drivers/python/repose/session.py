@@ -108,6 +108,11 @@ class Face:
         return self.info.get("other_rest")
 
     @property
+    def summary(self):
+        """Movement of the face, accuracy, warnings and contact, a text; None where it was not requested."""
+        return self.info.get("summary")
+
+    @property
     def displacement(self):
         return self.position - self.initial
 
@@ -200,17 +205,19 @@ class Session:
         self.changes = values
 
     def solve(self, plan, accuracy=None, tangents=False, base="scene", gradient_of=None,
-              other_rest=False):
+              other_rest=False, summary=False):
         """The face for a plan, to `accuracy` mm (the scene's). `base` is where the search begins:
         "scene", the plan of the scene's moves, "rest", the initial state, or another plan. `gradient_of`
         {row: [x, y, z]}: weights of points of the skin, by the derivatives of whose sum Σ w · x the face
         has a `gradient`. With `other_rest` the search begins at the initial state and looks for another
         rest position, which contact may allow: the face is that of less energy, and its `other_rest`
-        says how far and where the skin of the other one is."""
+        says how far and where the skin of the other one is. With `summary` the face has one, as of `write`."""
         request = {"do": "solve", "plan": _plain(plan), "tangents": tangents,
                    "base": base if isinstance(base, str) else _plain(base)}
         if other_rest:
             request |= {"base": "rest", "other_rest": True}
+        if summary:
+            request["summary"] = True
         if accuracy is not None:
             request["accuracy"] = float(accuracy)
         if gradient_of:

@@ -36,6 +36,7 @@ class PlanSession {
     std::vector<std::pair<int64_t, Vec3>> functional = {};
     const Placements* base = nullptr;  ///< where it begins; null: the initial state
     bool other_rest = false;           ///< from the initial state, search for another rest position
+    bool described = false;            ///< the answer has a description
     std::function<bool()> abandoned = {};  ///< as solve::Settings
   };
   struct Answer {
@@ -44,6 +45,7 @@ class PlanSession {
     std::vector<model::PointField> field;  ///< [N] contact and tangents
     bool abandoned = false;                ///< there is nothing else then
     bool from_base = false;                ///< the search began at the base and ended there
+    std::string description;               ///< of the face and what it touches, as of write()
   };
 
   /// Reads and builds a scene with changes. Throws InputError where it has no plan, or what a
