@@ -46,7 +46,8 @@ bool BodyContact::face(size_t c, size_t d) const {
   return normal_[c].dot(normal_[d]) < facing * normal_[c].norm() * normal_[d].norm();
 }
 
-std::vector<std::pair<size_t, size_t>> BodyContact::overlapped(double overlap) const {
+std::vector<std::pair<size_t, size_t>> BodyContact::overlapped() const {
+  constexpr double overlap = 1e-3;  // mm, above what rounding leaves of bodies that touch
   std::vector<size_t> near;
   for (size_t c = 0; c < gap_.size(); ++c)
     if (!released(c) && std::isfinite(gap_[c])) near.push_back(c);
@@ -58,8 +59,8 @@ std::vector<std::pair<size_t, size_t>> BodyContact::overlapped(double overlap) c
   return found;
 }
 
-bool BodyContact::release_overlapped(double overlap) {
-  const auto pairs = overlapped(overlap);
+bool BodyContact::release_overlapped() {
+  const auto pairs = overlapped();
   for (const auto& [first, second] : pairs) {
     const size_t c = slides(second) && !slides(first) ? first : second;
     released_[c] = 1;
@@ -202,9 +203,9 @@ std::vector<LinearGap> BodyContact::other_sides(std::span<const Vec3> position) 
   return found;
 }
 
-std::vector<LinearGap> BodyContact::ways_out(std::span<const Vec3> position, double overlap) const {
+std::vector<LinearGap> BodyContact::ways_out(std::span<const Vec3> position) const {
   std::vector<LinearGap> found;
-  for (const auto& [first, second] : overlapped(overlap)) {
+  for (const auto& [first, second] : overlapped()) {
     const auto one = gap_round_edge(first, position), other = gap_round_edge(second, position);
     if (one || other) found.push_back(!other || (one && one->gap >= other->gap) ? *one : *other);
   }

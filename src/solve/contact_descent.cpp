@@ -74,9 +74,11 @@ Outcome ContactDescent::finish(Vec displacement, double accuracy) {
       minimizer_.finish(displacement, (1 - missed) * accuracy, programs_.take_last_step());
   objective_.positions().update(displacement);
   outcome.displacement_error += contact_safety * penalty_.violation();
-  outcome.overlapped = base::sum_over_ranks(objective_.positions().comm(),
-                                            objective_.contact().bodies().count_released());
-  outcome.converged = outcome.converged && outcome.displacement_error <= accuracy;
+  const MPI_Comm comm = objective_.positions().comm();
+  const mechanics::BodyContact& contact = objective_.contact().bodies();
+  outcome.overlapped = base::sum_over_ranks(comm, contact.count_released());
+  outcome.converged = outcome.converged && outcome.displacement_error <= accuracy &&
+                      !base::on_any_rank(comm, contact.any_overlapped());
   return outcome;
 }
 
@@ -94,22 +96,22 @@ Outcome ContactDescent::finish_reached(Vec displacement, double accuracy, int64_
 
 /// Releases points between bodies that overlap from one of them. Returns true if there are any.
 /// Collective.
-bool ContactDescent::release_overlapped(double accuracy) {
+bool ContactDescent::release_overlapped() {
   discrete::Positions& positions = objective_.positions();
   mechanics::BodyContact& contact = objective_.contact().bodies();
   contact.update_gaps(positions.local());
-  const bool any = base::on_any_rank(positions.comm(), contact.release_overlapped(accuracy));
+  const bool any = base::on_any_rank(positions.comm(), contact.release_overlapped());
   if (any) tangent_.forget_contact();
   return any;
 }
 
 /// Leads points between bodies that overlap out round an edge of one of them. Returns true if there
 /// are any that have such a way. Collective.
-bool ContactDescent::lead_out(Vec displacement, double accuracy) {
+bool ContactDescent::lead_out(Vec displacement) {
   discrete::Positions& positions = objective_.positions();
   programs_.evaluate(displacement);
   programs_.linearize(displacement);
-  const auto ways = objective_.contact().bodies().ways_out(positions.local(), accuracy);
+  const auto ways = objective_.contact().bodies().ways_out(positions.local());
   if (!base::on_any_rank(positions.comm(), !ways.empty())) return false;
   const bool found = programs_.step_with(ways, displacement);
   tangent_.forget_contact();
@@ -160,8 +162,8 @@ Outcome ContactDescent::settle(Vec displacement, double accuracy, int max_rounds
     if (!outcome.stable && leaves()) continue;
     const double before = std::exchange(missing, penalty_.violation());
     if (missing > steady * before) {
-      const bool leads = !std::exchange(led_out, true) && lead_out(displacement, accuracy);
-      if (leads || release_overlapped(accuracy)) {
+      const bool leads = !std::exchange(led_out, true) && lead_out(displacement);
+      if (leads || release_overlapped()) {
         missing = none;
         needs_presolve = !leads;
         continue;

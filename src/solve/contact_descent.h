@@ -33,8 +33,8 @@ class ContactDescent {
   Outcome stopped(Vec displacement, Outcome outcome = {});
 
  private:
-  bool release_overlapped(double accuracy);
-  bool lead_out(Vec displacement, double accuracy);
+  bool release_overlapped();
+  bool lead_out(Vec displacement);
   void soften();
   void harden(Vec displacement);
 

@@ -45,7 +45,7 @@ Outcome ContactSearch::run(Vec displacement, double accuracy) {
   outcome = descent_.settle(displacement, accuracy, max_rounds, false);
   outcome.iterations += iterations;
   if (outcome.stopped) return outcome;
-  if (!outcome.converged && outcome.displacement_error > accuracy)
+  if (!outcome.converged && (outcome.stable || outcome.displacement_error > accuracy))
     outcome.reason =
         fmt::format("contact did not converge: {:.3g} mm of gaps remain", penalty_.violation());
   return outcome;

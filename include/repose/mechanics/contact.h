@@ -106,16 +106,17 @@ class BodyContact {
   double pressure(size_t c) const { return now(c).pressure; }
   const Vec3& normal(size_t c) const { return normal_[c]; }
 
-  /// Releases a constraint of each point between two bodies whose surfaces face each other and
-  /// overlap by more than `overlap` mm at the latest update, so that no place is outside both: that
-  /// on the latter body in the model, or the one that does not slide. Returns true if there are
-  /// any. Of this rank.
-  bool release_overlapped(double overlap);
+  /// Returns true if a point of this rank is between two bodies whose surfaces face each other and
+  /// overlap at the latest update, so that no place is outside both.
+  bool any_overlapped() const { return !overlapped().empty(); }
+  /// Releases a constraint of each such point: that on the latter body in the model, or the one
+  /// that does not slide. Returns true if there are any. Of this rank.
+  bool release_overlapped();
   /// Lets released constraints act again.
   void restore_released() { released_.assign(released_.size(), 0); }
   /// Gaps to first order, as those of other_sides(), of points that release_overlapped() would
   /// release: for each the less deep of its two bodies' sides round an edge, if there is one.
-  std::vector<LinearGap> ways_out(std::span<const Vec3> position, double overlap) const;
+  std::vector<LinearGap> ways_out(std::span<const Vec3> position) const;
   /// Returns how many constraints are released, of this rank.
   int64_t count_released() const { return std::ranges::count(released_, char{1}); }
 
@@ -123,7 +124,7 @@ class BodyContact {
   bool released(size_t c) const { return released_[c] != 0; }
   bool slides(size_t c) const { return pairs_.binding[c] == model::Binding::slides; }
   bool face(size_t c, size_t d) const;
-  std::vector<std::pair<size_t, size_t>> overlapped(double overlap) const;
+  std::vector<std::pair<size_t, size_t>> overlapped() const;
   double min_gap(size_t c, const Vec3& beside) const;  // mm, that it can have become
   /// mm, the distance of a point outside from which a gap above `smoothed_to` may be the exact one.
   double exact_from(size_t c, double smoothed_to) const {

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <numbers>
+#include <optional>
 
 #include "model/add_contact.h"
 #include "repose/model/cut.h"
@@ -163,21 +164,24 @@ TEST(Contact, TheEstimateHoldsWherePointsTouchTwoPlanes) {
   }
 }
 
+/// A block whose top is pressed down by 0.9 mm, and by a plane from below whose height is `below`,
+/// mm.
+Rest press(std::optional<double> below, double way, double accuracy) {
+  model::Model m = solid_block(4, 4, 4, poisson, 0, [](int, int, int a) {
+    return a == 3 ? PointSet::held : PointSet::soft_tissue;
+  });
+  const Vec3 z = Vec3::UnitZ();
+  const std::vector<double> top = face_areas(m, z, 0);
+  testing::aim(m, [&](const Vec3& x) -> Vec3 { return x + Vec3(way, 0, 0); });
+  bind_face(m, plane(Vec3::Zero(), -z, {0, 0, -0.9}), Binding::touches, top);
+  if (below) bind_face(m, plane(*below * z, z), Binding::touches, top);
+  return testing::find_rest(m, settings(accuracy));
+}
+
 // The upper plane ends 0.6 mm below the lower one: no place is outside both.
 TEST(Contact, PointsBetweenBodiesThatOverlapRestOnTheFirst) {
-  const auto pressed = [](bool from_below, double way) {
-    model::Model m = solid_block(4, 4, 4, poisson, 0, [](int, int, int a) {
-      return a == 3 ? PointSet::held : PointSet::soft_tissue;
-    });
-    const Vec3 z = Vec3::UnitZ();
-    const std::vector<double> top = face_areas(m, z, 0);
-    testing::aim(m, [&](const Vec3& x) -> Vec3 { return x + Vec3(way, 0, 0); });
-    bind_face(m, plane(Vec3::Zero(), -z, {0, 0, -0.9}), Binding::touches, top);
-    if (from_below) bind_face(m, plane(-0.3 * z, z), Binding::touches, top);
-    return testing::find_rest(m, settings(1e-4));
-  };
   for (const double way : {0.1, 0.0}) {  // mm; without one there is no path
-    const Rest alone = pressed(false, way), between = pressed(true, way);
+    const Rest alone = press({}, way, 1e-4), between = press(-0.3, way, 1e-4);
     EXPECT_TRUE(alone.summary.path.complete());
     EXPECT_FALSE(between.summary.path.complete());
     EXPECT_EQ(between.summary.path.load, 1);
@@ -187,6 +191,12 @@ TEST(Contact, PointsBetweenBodiesThatOverlapRestOnTheFirst) {
       EXPECT_LE((alone.rows.position[i] - between.rows.position[i]).norm(), 2e-4);
     EXPECT_NEAR(between.summary.last.penetration, 0.6, 1e-3);
   }
+}
+
+TEST(Contact, PointsBetweenBodiesThatOverlapByLessThanTheAccuracyAreNotAtRest) {
+  const Rest between = press(-0.84, 0.1, 0.1);
+  EXPECT_FALSE(between.summary.path.complete());
+  EXPECT_EQ(between.summary.path.last.overlapped, 16);
 }
 
 // The plane ends 0.3 mm below the top of a narrow box. One point between them has a way out past
