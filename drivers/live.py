@@ -155,7 +155,9 @@ class Handler(http.server.BaseHTTPRequestHandler):
         if not self.allowed(self.headers.get("X-Token", "")):
             return
         work = {"/solve": self.solve, "/scene_file": self.scene_file, "/result": self.result,
-                "/report": self.report}[self.path]
+                "/report": self.report}.get(self.path)
+        if not work:
+            return self.reply(404, b"there is no such page\n", "text/plain")
         self.reply(200, work(json.loads(content)))
 
     def solve(self, request):
@@ -189,28 +191,41 @@ class Handler(http.server.BaseHTTPRequestHandler):
 
     def report(self, request):
         """Writes the result and its planning sheet."""
+        name, file = self.server.output, pathlib.Path(f"{self.server.output}.h5")
         with self.server.writing:
-            name = self.server.output
             self.server.session.write(name, request["plan"])
+            written = file.stat()
             done = subprocess.run([sys.executable, HERE / "report.py", name, "-output", f"{name}.html", "-scene",
                                    self.server.scene], capture_output=True, text=True)
         if done.returncode != 0:
-            raise ValueError(done.stderr.strip().splitlines()[-1] if done.stderr.strip() else "report.py failed")
+            reason = done.stderr.strip().splitlines()[-1:] or ["report.py failed"]
+            raise Unusable(f"{reason[0]}; {file} is written")
+        if not file.exists() or file.stat().st_mtime_ns != written.st_mtime_ns:
+            raise Unusable(f"{file} has been written by another program since; write again, or choose another -output")
         return f"{name}.html".encode()
 
     def log_message(self, *_):
         pass
 
 
+class Server(http.server.ThreadingHTTPServer):
+    daemon_threads = True
+
+    def handle_error(self, request, client_address):
+        """Passes over connections that end within a request."""
+        if not isinstance(sys.exc_info()[1], ConnectionError):
+            super().handle_error(request, client_address)
+
+
 def make_server(session, scene, port=0, output=None):
     """A server of the page about a session of this scene, and its address. Results are called `output` and an ending."""
     try:
-        server = http.server.ThreadingHTTPServer(("127.0.0.1", port), Handler)
+        server = Server(("127.0.0.1", port), Handler)
     except OSError as reason:
         refuse(f"-port {port}: {reason.strerror}; choose another one, or 0 for a free one")
-    server.daemon_threads = True
     server.session, server.scene, server.writing = session, scene.resolve(), threading.Lock()
-    server.output = (output or scene.with_name(scene.stem + "_plan")).resolve()
+    output = output or scene.with_name(scene.stem + "_plan")
+    server.output = (output.with_suffix("") if output.suffix == ".h5" else output).resolve()
     server.angles = ProfileAngles(server.scene, session)
     server.token, server.page = secrets.token_urlsafe(18), page(server.scene)
     return server, f"http://127.0.0.1:{server.server_address[1]}/?token={server.token}"

@@ -7,6 +7,7 @@ const TOKEN = new URLSearchParams(location.search).get("token");
 const COMPONENTS = ["tx", "ty", "tz", "rx", "ry", "rz"];
 const KEPT = 2;  // a state of the view beside BEFORE and NOW
 const NOTICE_TIME = 5000;  // ms
+const PATIENCE = 1000;     // ms, at first, with a window that overtakes this one
 const ROUNDING = 1e-9;     // mm or degrees
 const isSame = (one, other) => JSON.stringify(one) === JSON.stringify(other);
 
@@ -44,7 +45,7 @@ class Planner {
     this.future = [];
     this.reference = null;  // {plan, position, columns}: the latest solved with tangents
     this.exact = null;      // {plan, position}: the latest solved
-    this.asked = 0;
+    this.asked = this.overtaken = 0;
     this.solved = arrays.position;  // initial positions of the skin that is solved
     // It has no cuts: lips that part are shown on the skin that is solved.
     this.own = !head.cuts && arrays.given_rows && {rows: arrays.given_rows, weights: arrays.given_weights,
@@ -316,9 +317,11 @@ class Planner {
     try {
       const answer = await ask("/solve", {plan, tangents, summary: tangents});
       if (!answer.byteLength) {  // overtaken by another plan, of this window or of another one
-        if (current()) this.timer = setTimeout(() => this.solve(tangents), 1000 * (1 + Math.random()));
+        const pause = PATIENCE * 2 ** this.overtaken++ * (1 + Math.random());
+        if (current()) this.timer = setTimeout(() => this.solve(tangents), pause);
         return;
       }
+      this.overtaken = 0;
       const {head, arrays} = unpack(answer);
       if (head.converged) this.exact = {plan, position: arrays.position};
       if (head.converged && isSame(plan, this.keptPlan)) this.keepFace(this.follow(arrays.position), true);

@@ -130,6 +130,19 @@ unpack = buffer => {
   found.missing = seen();
   return found;
 })()"""
+# Another window overtakes the first four requests for a face.
+OVERTAKEN = """
+const pauses = [], wait = setTimeout, request = ask;
+setTimeout = (work, time) => {
+  if (time >= 1000) pauses.push(time);
+  return wait(work, Math.min(time, 60));
+};
+ask = (path, given) => path === "/solve" && pauses.length < 4 ? new ArrayBuffer(0) : request(path, given);
+(async () => {
+  while (!window.planner) await sleep(1);
+  await exact();
+  return {pauses};
+})()"""
 WARNED = """
 (async () => {
   const found = {}, told = () => document.getElementById("cautions").textContent;
@@ -330,6 +343,33 @@ def browsed(live, served, script, size):
     found = json.loads(FOUND.search(message)[1].replace("&amp;", "&"))
     assert "error" not in found, found
     return found
+
+
+def test_a_report_is_of_its_own_plan(live, served, tmp_path, monkeypatch):
+    server, address = served
+    file = tmp_path / "plan.h5"
+    monkeypatch.setattr(server, "output", tmp_path / "plan")
+    monkeypatch.setattr(server.session, "write", lambda *_: file.write_bytes(b""))
+
+    def write_meanwhile(*_, **__):
+        os.utime(file, ns=(1, 1))
+        return types.SimpleNamespace(returncode=0)
+    monkeypatch.setattr(live.subprocess, "run", write_meanwhile)
+    code, message = status(address, "/report", {"X-Token": server.token}, b'{"plan": {}}')
+    assert code == 409 and f"{file} has been written by another program since" in message.decode()
+
+
+def test_a_result_is_called_without_its_ending_or_with_it(live, served):
+    server, _ = served
+    for name in "plan", "plan.h5":
+        own, _ = live.make_server(server.session, server.scene, output=server.scene.with_name(name))
+        with own:
+            assert own.output == server.scene.with_name("plan")
+
+
+def test_windows_that_overtake_each_other_wait_longer_and_longer(live, served):
+    pauses = browsed(live, served, OVERTAKEN, "1200,900")["pauses"]
+    assert len(pauses) >= 4 and all(1000 * 2**k <= pause <= 2000 * 2**k for k, pause in enumerate(pauses[:4])), pauses
 
 
 def test_an_exact_face_has_the_warnings_of_its_summary(live, served):

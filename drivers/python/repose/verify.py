@@ -79,6 +79,8 @@ class Verifier:
         with self._lock:
             self._cold = cold
         try:
+            if self._closed:  # meanwhile
+                raise ValueError("its session has ended")
             if changes:
                 cold.change(**changes)
             face = cold.solve(plan, accuracy, other_rest=True)
