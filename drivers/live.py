@@ -29,7 +29,6 @@ from sheet.summary import cautions, sentence  # noqa: E402
 from sheet.web_page import read_web, web_page  # noqa: E402
 
 LONGEST_REQUEST = 1 << 20
-VERIFY_EVERY = 20  # answers, of which one is solved again from a cold start
 ANGLES = ("facial convexity", "nasolabial angle", "nasolabial angle by the tip", "mentolabial angle")
 
 
@@ -164,7 +163,8 @@ class Handler(http.server.BaseHTTPRequestHandler):
         session = self.server.session
         head, arrays = session.ask({**request, "do": "solve"})
         if request.get("points", "skin") == "skin":
-            session.count_answer(request["plan"], head, arrays["position"], request.get("accuracy"))
+            if request.get("tangents"):  # the page rests there
+                session.count_answer(request["plan"], head, arrays["position"], request.get("accuracy"))
             head["angles"] = self.server.angles.of(arrays["position"])
             head["cautions"] = [sentence(*one) for one in cautions(head.get("summary", "").splitlines())]
         return packed(head, arrays)
@@ -173,7 +173,9 @@ class Handler(http.server.BaseHTTPRequestHandler):
         """Returns the text beside the mark of the page: the latest verification, and a scene that has changed."""
         session = self.server.session
         latest = session.verifications[-1:]
-        said = {"text": latest[0].message if latest else "", "good": all(one.agrees for one in latest)}
+        said = {"text": "", "good": True}
+        if latest:
+            said = {"text": latest[0].message, "good": latest[0].agrees, "plan": latest[0].plan}
         if session.scene_changed:
             said = {"text": "the scene or one of its files has changed on disk: the faces are those of the "
                             "scene as it was; start live.py again", "good": False}
@@ -201,7 +203,8 @@ class Handler(http.server.BaseHTTPRequestHandler):
             reason = done.stderr.strip().splitlines()[-1:] or ["report.py failed"]
             raise Unusable(f"{reason[0]}; {file} is written")
         if not file.exists() or file.stat().st_mtime_ns != written.st_mtime_ns:
-            raise Unusable(f"{file} has been written by another program since; write again, or choose another -output")
+            raise Unusable(f"{file} has been written by another program since; write again, or choose another "
+                           "-output")
         return f"{name}.html".encode()
 
     def log_message(self, *_):
@@ -248,7 +251,7 @@ def main():
         refuse_missing(missing, "apt-get install --no-install-recommends python3-numpy")
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
     try:
-        with repose.Session(options.scene, options.ranks, verify_every=VERIFY_EVERY) as session:
+        with repose.Session(options.scene, options.ranks, verify_every=1) as session:
             server, address = make_server(session, options.scene, options.port, options.output)
             print(f"{options.scene}: {address}\nCtrl-C ends it.", flush=True)
             if not options.no_browser:

@@ -161,6 +161,10 @@ class Planner {
     if (key === "y") this.step(this.future, this.past);
   }
 
+  isAt(plan) {
+    return [...this.pieces.keys()].every(name => isSame(this.plan[name], plan[name]));
+  }
+
   setGizmo(mode) {
     this.gizmo.setMode(mode);
     byId("move").setAttribute("aria-pressed", mode === "translate");
@@ -235,7 +239,7 @@ class Planner {
     this.placeHandle();
     this.showNumbers();
     moveBones(this.bones, this.plan, this.centroids);
-    for (const id of ["under", "written", "cautions"]) byId(id).textContent = "";
+    for (const id of ["under", "written", "cautions", "notice"]) byId(id).textContent = "";
     byId("angles").style.visibility = "hidden";
     this.preview();
     this.solveSoon();
@@ -447,11 +451,11 @@ class Planner {
   }
 }
 
-// Shows the outcome of the latest verification from a cold start, or that the scene has changed.
+// Shows how this plan was verified from a cold start, or that the scene has changed.
 async function showNotice() {
   try {
-    const {text, good} = JSON.parse(new TextDecoder().decode(await ask("/notice")));
-    byId("notice").textContent = text;
+    const {text, good, plan} = JSON.parse(new TextDecoder().decode(await ask("/notice")));
+    byId("notice").textContent = !plan || planner.isAt(plan) ? text : "";
     byId("notice").className = good ? "" : "bad";
   } catch (error) {
     byId("notice").textContent = `the server of this page does not answer: ${error.message}`;

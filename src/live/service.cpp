@@ -284,6 +284,7 @@ void Service::solve(const Request& request, Reply& reply) {
   json& head = reply.head();
   head["converged"] = path.complete();
   head["error"] = path.last.displacement_error;
+  head["energy"] = path.last.objective;
   head["reason"] = path.last.reason;
   head["evaluations"] = answer.summary.evaluations;
   head["from_base"] = answer.from_base;

@@ -78,7 +78,7 @@ class Cold:
 
     def __init__(self, position, converged=True, other=None):
         self.face = repose.Face({}, position, position, None, 0.001, converged, {}, None,
-                                {"reason": "the limit of iterations", "other_rest": other})
+                                {"reason": "the limit of iterations", "other_rest": other, "energy": 2.5})
         self.closed = False
 
     def solve(self, plan, accuracy, other_rest):
@@ -96,7 +96,8 @@ OTHER = {"distance": 0.61, "place": [7.2, 8, 9]}
 @pytest.mark.parametrize("shift, converged, words", [
     (0.0, True, "the same face within 0.000 mm; at [7, 8, 9] mm tissue has another rest position, 0.61 mm "
                 "away"),
-    (0.9, True, "NOT verified: a search from a cold start ends 0.90 mm away, at [7, 8, 9] mm"),
+    (0.9, True, "NOT verified: a search from a cold start ends 0.90 mm away, at [7, 8, 9] mm, with an energy of "
+                "2.5 in place of 3 N mm"),
     (0.0, False, "not verified: the search from a cold start ended with the limit of iterations")])
 def test_a_face_that_differs_is_reported(shift, converged, words):
     position, cold = np.array([[1.0, 2, 3], [7, 8, 9]]), []
@@ -106,7 +107,7 @@ def test_a_face_that_differs_is_reported(shift, converged, words):
         cold.append(Cold(other, converged, OTHER))
         return cold[-1]
     verifier = Verifier(start, 1)
-    verifier.add(PLAN, position, 0.1)
+    verifier.add(PLAN, position, 3.0, 0.1)
     verifier.wait()
     (one,) = verifier.outcomes
     assert words in one.message and one.agrees == (not shift and converged) and cold[0].closed

@@ -251,8 +251,8 @@ class Session:
     def count_answer(self, plan, head, position, accuracy=None):
         """Counts an answer for verification; `solve` does so itself."""
         if self._verifier and head["converged"]:
-            self._verifier.add(_plain(plan), np.array(position), accuracy or self.accuracy,
-                               self.changes)
+            self._verifier.add(_plain(plan), np.array(position), head["energy"],
+                               accuracy or self.accuracy, self.changes)
 
     @property
     def verifications(self):

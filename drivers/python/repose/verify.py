@@ -29,13 +29,13 @@ class Verifier:
         self._count, self._due, self._closed = 0, None, False
         self._lock, self._thread, self._cold = threading.Lock(), None, None
 
-    def add(self, plan, position, accuracy, changes=None):
-        """Counts a converged answer, of a scene with changes (Session.change)."""
+    def add(self, plan, position, energy, accuracy, changes=None):
+        """Counts a converged answer, its energy in N mm, of a scene with changes (Session.change)."""
         with self._lock:
             self._count += 1
             if self._closed or self._count % self.every:
                 return
-            self._due = plan, position, accuracy, changes
+            self._due = plan, position, energy, accuracy, changes
             if self._thread is None:
                 self._thread = threading.Thread(target=self._work, daemon=True)
                 self._thread.start()
@@ -74,7 +74,7 @@ class Verifier:
             if self.tell:
                 self.tell(outcome)
 
-    def _verify(self, plan, position, accuracy, changes):
+    def _verify(self, plan, position, energy, accuracy, changes):
         cold = self.start()
         with self._lock:
             self._cold = cold
@@ -101,6 +101,6 @@ class Verifier:
                             f"another rest position, {face.other_rest['distance']:.2f} mm away")
         else:
             message = (f"NOT verified: a search from a cold start ends {apart.max():.2f} mm away, at "
-                       f"{np.round(position[apart.argmax()]).astype(int).tolist()} mm; there may be two "
-                       "rest positions")
+                       f"{np.round(position[apart.argmax()]).astype(int).tolist()} mm, with an energy of "
+                       f"{face.info['energy']:.4g} in place of {energy:.4g} N mm: there are two rest positions")
         return Verification(plan, float(apart.max()), agrees, message)
