@@ -50,6 +50,12 @@ bool same(const PlanSession::Placements& a, const PlanSession::Placements& b) {
   });
 }
 
+/// Returns all rows of fields, on rank 0. Collective.
+std::vector<model::PointField> gather_fields(MPI_Comm comm, std::vector<model::PointField> fields) {
+  for (model::PointField& field : fields) field.values = base::gather(comm, field.values);
+  return fields;
+}
+
 bool is_tangent(const model::PointField& field) { return field.name.starts_with("tangent_"); }
 
 /// Gives the bones of a model other motions.
@@ -289,10 +295,7 @@ PlanSession::Answer PlanSession::solve(const Request& request) {
   if (answer.abandoned) return answer;
   answer.from_base = answer.summary.path.leapt;
   answer.position = base::gather(s.comm, solved.rows.position);
-  for (const model::PointField& field : solved.rows.point_fields) {
-    answer.field.push_back(field);
-    answer.field.back().values = base::gather(s.comm, field.values);
-  }
+  answer.field = gather_fields(s.comm, solved.rows.point_fields);
   s.last = std::move(solved);
   if (request.described) {
     const SolvedSkin skin(s.comm, s.job);

@@ -285,9 +285,8 @@ base::Exit Run::solve() {
   const solve::Summary summary = search(writer);
   writer.commit();
   const bool folded = summary.last.inverted_prisms > 0 && !folds_allowed_;
-  const std::string folds =
-      folded ? describe_folds(comm, part(), summary.last.inverted_prisms, writer.volume_ratio())
-             : "";
+  const std::string folds = describe_folds(comm, part(), folded ? summary.last.inverted_prisms : 0,
+                                           writer.volume_ratio());
   const std::vector<Vec3> now = skin.points_at(writer.slab());
   const std::string given = write_given_skin(comm, job_, name_, skin, now);
   stages_.end("write");

@@ -406,7 +406,6 @@ Summary RestSolver::find(const Settings& settings, const Start& start, const Rec
   const base::VecHandle guess = start.guess ? positions.make_vector() : base::VecHandle();
   if (start.guess || settings.path.start_load > 0)
     natural.set_unknowns(start.position, positions, start.guess ? guess : displacement);
-
   Searcher searcher(state_->problem, settings);
   if (settings.on_iterate) report_iterates(searcher, settings, natural);
   Summary summary;
