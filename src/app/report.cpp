@@ -86,7 +86,7 @@ std::string remedy(const solve::Summary& s, bool stretched) {
     return fmt::format(
         " The accuracy is finer than the estimate of this functional reaches: try -accuracy "
         "{:.1g} or larger.",
-        10 * s.last.displacement_error);
+        100 * s.last.displacement_error);
   return " Check the units and stiffnesses, move the bones less, or try more -load_steps.";
 }
 
