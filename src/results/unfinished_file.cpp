@@ -54,16 +54,18 @@ void UnfinishedFile::copy_file() const {
 }
 
 void UnfinishedFile::reserve(int64_t bytes) const {
-  const int descriptor = open(part_.c_str(), O_WRONLY | O_CLOEXEC);
-  const off_t end = lseek(descriptor, 0, SEEK_END);
-  const bool reserved = fallocate(descriptor, FALLOC_FL_KEEP_SIZE, end, bytes) == 0;
-  const int reason = errno;
-  if (descriptor >= 0) close(descriptor);
-  if (reserved) return;
   std::error_code error;
   const auto left =
       static_cast<int64_t>(std::filesystem::space(base::folder_of(file_), error).available);
-  if (reason == ENOSPC || reason == EDQUOT || (!error && left < bytes))
+  bool lacking = !error && left < bytes;  // to try would fill the disk of all others for a while
+  if (!lacking) {
+    const int descriptor = open(part_.c_str(), O_WRONLY | O_CLOEXEC);
+    const off_t end = lseek(descriptor, 0, SEEK_END);
+    lacking = fallocate(descriptor, FALLOC_FL_KEEP_SIZE, end, bytes) != 0 &&
+              (errno == ENOSPC || errno == EDQUOT);
+    if (descriptor >= 0) close(descriptor);
+  }
+  if (lacking)
     base::refuse(
         "{}: needs {:.2f} MB more, its disk has {:.2f} MB left; free space or choose another "
         "-output",

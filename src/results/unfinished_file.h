@@ -20,7 +20,7 @@ class UnfinishedFile {
   void copy_file() const;
   /// Sets room for `bytes` more than the part holds aside on the disk, so that no write that
   /// many ranks take part in finds it full: MPI-IO hangs then. InputError where the disk has less.
-  /// File systems that cannot reserve are requested their free space instead.
+  /// On file systems that cannot reserve, the free space alone decides.
   void reserve(int64_t bytes) const;
   /// fsync, rename, fsync of the folder. InputError if the disk refuses.
   void commit();
