@@ -55,18 +55,6 @@ Vec3 widest_direction(const std::vector<Vec3>& points) {
   return Eigen::SelfAdjointEigenSolver<Mat3>(scatter_of(points)).eigenvectors().col(2);
 }
 
-/// Returns where a patch of skin faces, `outward` or the other way; nothing if it is of a cheek.
-std::optional<Vec3> facing_of_patch(const SkinMesh& mesh, const Vec3& outward,
-                                    const BoneGroup& upper, const BoneGroup& lower) {
-  Vec3 skin = Vec3::Zero();
-  for (const Vec3& x : mesh.points) skin += x / static_cast<double>(mesh.points.size());
-  const Vec3 bones = (upper.box.center() + lower.box.center()) / 2, facing = outward.normalized();
-  const bool named_wrongly = upper.box.volume() < lower.box.volume();  // a jaw is the smaller one
-  const BoneGroup& jaw = named_wrongly ? upper : lower;
-  if (std::abs(facing.dot(widest_direction(jaw.points))) > sideways) return {};
-  return facing.dot(skin - bones) < 0 ? Vec3(-facing) : facing;
-}
-
 /// Returns where a head with a closed skin faces: across the jaw's width and the way up to the
 /// skull. Behind the jaw's middle are its highest points, of the rami, and along the nearest axis
 /// of the coordinates the skull's middle; nothing if these are on different sides.
@@ -89,6 +77,22 @@ std::optional<Vec3> facing_of_bones(const BoneGroup& upper, const BoneGroup& low
   if (std::abs(ahead) < behind || to_skull[axis] * std::copysign(1, facing[axis]) > -behind)
     return {};
   return facing;
+}
+
+/// Returns where a patch of skin faces, `outward` or the other way, and in its place where bones
+/// face that do not face away from there: a patch of chin and neck faces down. Nothing if it is of
+/// a cheek.
+std::optional<Vec3> facing_of_patch(const SkinMesh& mesh, const Vec3& outward,
+                                    const BoneGroup& upper, const BoneGroup& lower) {
+  Vec3 skin = Vec3::Zero();
+  for (const Vec3& x : mesh.points) skin += x / static_cast<double>(mesh.points.size());
+  const Vec3 bones = (upper.box.center() + lower.box.center()) / 2, normal = outward.normalized();
+  const bool named_wrongly = upper.box.volume() < lower.box.volume();  // a jaw is the smaller one
+  const BoneGroup& jaw = named_wrongly ? upper : lower;
+  if (std::abs(normal.dot(widest_direction(jaw.points))) > sideways) return {};
+  const Vec3 facing = normal.dot(skin - bones) < 0 ? Vec3(-normal) : normal;
+  const auto of_bones = named_wrongly ? std::nullopt : facing_of_bones(upper, lower);
+  return of_bones && of_bones->dot(facing) > 0 ? of_bones : facing;
 }
 
 template <class Keep>

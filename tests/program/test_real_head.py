@@ -1,6 +1,7 @@
 """A real head (CT) whose jaw opens by 8° and comes 6 mm forward. The data are not
 shipped: they lie beside the project, in ../shared/data/head."""
 
+import re
 from collections import defaultdict
 
 import numpy as np
@@ -100,3 +101,13 @@ def test_a_face_scanned_lying_is_in_equilibrium_and_hangs_upright(folder, run, t
     assert step["converged"] and step["smallest_eigenvalue"] > 0 and step["inverted_prisms"] == 0
     sag = step["point/displacement"][model_of(file)["point/layer"] == 0][:, 2]
     assert -4 < sag.min() < -2 and sag.max() < 0.5
+
+
+def test_lips_of_a_split_jaw_are_named_where_they_are(run, folder):
+    """The skin that is solved is chin and neck for the most part, and faces down."""
+    for name in ("real_head_split.yaml", "real_head_split.obj"):
+        (folder / name).symlink_to(PROJECT / "meshes" / name)
+    result = run("repose-solve", "real_head_split.yaml", "-accuracy", "1", "-skip_other_rest", cwd=folder)
+    rows = [line for line in result.stdout.splitlines() if "largest movement" in line]
+    assert len(rows) == 1 and re.search(r"lower lip \d\.\d mm forward", rows[0]), result
+    assert not re.search(r"(upper lip|nose) [3-9]\.\d mm", rows[0]), rows
