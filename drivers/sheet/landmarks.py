@@ -106,6 +106,8 @@ def once(pairs):
     """The dictionary of a JSON object; refuses a name with two places."""
     found = dict(pairs)
     for name, value in pairs:
+        if value is found[name]:
+            continue
         places = [place for place in (value, found[name]) if isinstance(place, list) and len(place) == 3]
         if len(places) == 2 and np.linalg.norm(np.subtract(*places)) > SAME:
             raise ValueError(f"'{name}' comes twice; remove one of them")

@@ -202,6 +202,12 @@ def test_two_landmarks_of_one_name_are_refused(tmp_path, name, words):
     assert len(read_landmarks(tmp_path / name)) == 1
 
 
+def test_a_list_of_three_points_is_no_place(tmp_path):
+    more = '[0, 0, 0]}, {"label": "scar", "position": [0, 0, 3]}, {"label": "mole", "position": [0, 0, 6]'
+    (tmp_path / "three.mrk.json").write_text(MARKUP.format("LPS", more))
+    assert list(read_landmarks(tmp_path / "three.mrk.json")) == ["a b", "scar", "mole"]
+
+
 def test_other_keys_and_places_that_agree_may_come_twice(tmp_path):
     (tmp_path / "marks.json").write_text('{"note": "x", "note": "y", "a b": [0, 0, 0], "a b": [0, 0, 0.0005]}')
     assert list(read_landmarks(tmp_path / "marks.json")) == ["a b"]
