@@ -29,11 +29,17 @@ std::string explain_unattached(const scene::Scene& scene, const SkinMesh& mesh,
         "of a piece that moves differently; set tissue.release smaller, or attach some to be fixed "
         "or slide",
         reached, scene.tissue.release);
+  const double distance = nearest_skin(mesh, bones, bone), within = scene.tissue.attach_within;
+  if (distance > within)
+    return fmt::format(
+        "no column of tissue reaches it: it is {:.1f} mm from the skin and tissue.attach_within is "
+        "{} mm; set attach_within greater or take the bone out",
+        distance, within);
   return fmt::format(
-      "no column of tissue reaches it: it is {:.1f} mm from the skin and tissue.attach_within is "
-      "{} "
-      "mm, or other bone lies between; set attach_within greater or take the bone out",
-      nearest_skin(mesh, bones, bone), scene.tissue.attach_within);
+      "no column of tissue reaches it, {:.1f} mm from the skin: other bone lies between, or the "
+      "skin that is solved ends before it; solve more of the skin (tissue.face, tissue.margin), or "
+      "take the bone out",
+      distance);
 }
 
 [[noreturn]] void refuse_unheld(const scene::Scene& scene, const Attachment& attachment) {
