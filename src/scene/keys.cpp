@@ -54,12 +54,11 @@ Keys volume_keys(const std::string& above) {
 Keys surface_keys() {
   const Keys skin{{"skin", mesh, "required",
                    "Triangle mesh of the skin, open or closed, or what volume to take it from."}};
-  const Keys bones{
-      {"bones", list, "required",
-       "The bones, each a triangle mesh or taken from a volume; the list may be empty."},
-      {"bones[].name", text, "required",
-       "The bone's name: 1 to 64 printable ASCII characters without '/'."},
-      {"bones[].file", file, "", "Triangle mesh of the bone; or give volume."}};
+  const Keys bones{{"bones", list, "required",
+                    "The bones, each a triangle mesh or taken from a volume; at least one."},
+                   {"bones[].name", text, "required",
+                    "The bone's name: 1 to 64 printable ASCII characters without '/'."},
+                   {"bones[].file", file, "", "Triangle mesh of the bone; or give volume."}};
   return joined({skin, volume_keys("skin"), bones, volume_keys("bones[]")});
 }
 
