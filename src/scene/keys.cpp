@@ -99,7 +99,8 @@ Keys tissue_keys() {
        .sentence =
            "Edge length of the mesh that is solved in place of the given skin: its outside over "
            "the bones that move, remeshed; auto: a seventieth of the head; given: the given skin "
-           "is solved or refused. Unset: the given skin where it can be solved, else auto.",
+           "is solved or refused. Unset: auto where the given skin is closed, has more than "
+           "100 000 triangles or cannot be solved, else given.",
        .unit = "mm",
        .range = Range::between(1, 20),
        .choices = {"auto", "given"}},
