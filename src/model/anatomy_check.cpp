@@ -14,16 +14,17 @@
 namespace repose::model {
 namespace {
 
-constexpr double flat = 0.03;            // thickness of a skin over its width
-constexpr double out_of_middle = 10;     // mm, between the middles of jaw and skull
-constexpr double apart = 12;             // mm, between jaw and skull
-constexpr double turning = 1;            // degrees
-constexpr double joint_slide = 5;        // mm
-constexpr double joint_over_chin = 1.5;  // of their displacements
-constexpr double joint_up = 4;           // mm
-constexpr double opening = 3;            // mm, of the front teeth
-constexpr double at_mouth = 45;          // mm
-constexpr double along_axis = 0.5;       // cosine
+constexpr double flat = 0.03;                           // thickness of a skin over its width
+constexpr double smallest_jaw = 15, largest_jaw = 400;  // mm, from its middle: in cm it is 8
+constexpr double out_of_middle = 10;                    // mm, between the middles of jaw and skull
+constexpr double apart = 12;                            // mm, between jaw and skull
+constexpr double turning = 1;                           // degrees
+constexpr double joint_slide = 5;                       // mm
+constexpr double joint_over_chin = 1.5;                 // of their displacements
+constexpr double joint_up = 4;                          // mm
+constexpr double opening = 3;                           // mm, of the front teeth
+constexpr double at_mouth = 45;                         // mm
+constexpr double along_axis = 0.5;                      // cosine
 constexpr double resolution = 1e-9;
 
 /// A scene's anatomy with what the checks share.
@@ -54,6 +55,17 @@ std::string check_flatness(const Anatomical& head) {
   if (squares[0] > flat * flat * squares[1] + resolution) return "";
   return "the skin is flat: it seems to be the end of a scan, not a face; give the face, or the "
          "skin of the whole head";
+}
+
+std::string check_size(const Anatomical& head) {
+  if (head.lower.empty() || head.upper.empty()) return "";
+  const double reach = head.lower.box.diagonal().norm() / 2;
+  if (reach >= smallest_jaw && reach <= largest_jaw) return "";
+  return fmt::format(
+      "{} reaches {:.3g} mm from its middle, a mandible about 80 mm: surfaces seem not to be in "
+      "mm; "
+      "scale them",
+      names_of(head, BoneRole::lower), reach);
 }
 
 std::string check_rest(const Anatomical& head) {
@@ -243,7 +255,7 @@ std::vector<std::string> check_anatomy(const scene::Scene& scene, const MotionRa
       if (std::string warning = check(head); !warning.empty())
         warnings.push_back(std::move(warning));
   };
-  run({check_flatness, check_rest});
+  run({check_flatness, check_size, check_rest});
   if (head.directions) run({check_axes, check_sides, check_fit, check_hinge, check_lips});
   return warnings;
 }

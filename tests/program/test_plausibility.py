@@ -102,6 +102,7 @@ WRONG = {
         changed(lambda points: 1.2 * points + [9, -4, 10], "mandible"), ["one scan", "mandible"]),
     "upside down": (changed(times(1, -1, -1)), ["upside down"]),
     "meters": (changed(times(1e-3, 1e-3, 1e-3)), ["meters"]),
+    "centimeters": (changed(times(0.1, 0.1, 0.1)), ["not to be in mm", "mandible"]),
     "mouth sealed": (closed_mouth, ["lips are one skin", "mouth: {path"]),
     "hinge in the chin": (text("center: [0, 0, 0]", "center: [0, -85, -60]"), ["hinge", "condyles"]),
     "a cap for a skin": (flat_cap, ["flat", "end of a scan"]),
