@@ -120,7 +120,8 @@ std::string describe_warnings(const std::vector<std::string>& warnings) {
 }
 
 std::string describe_cut(const model::Cut& cut, int64_t doubled) {
-  return report_row("incision", "along {} edges of the skin, {} points doubled in {} layers",
+  return report_row(cut.lips ? "parted lips" : "incision",
+                    "along {} edges of the skin, {} points doubled in {} layers",
                     cut.columns.size() - 1, doubled, cut.layers);
 }
 
