@@ -234,6 +234,7 @@ class Planner {
   change(plan, remembered = true) {
     const before = this.plan;
     this.plan = plan;
+    this.overtaken = 0;
     if (remembered) this.remember(before);
     this.showHistory();
     this.placeHandle();

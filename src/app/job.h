@@ -33,7 +33,7 @@ struct Job {
 
 /// Reads a scene (.yaml) with changes or a model (.h5), builds the scene's model with its initial
 /// equilibrium and makes its incisions. Each rank makes its part of a scene's model. Where no
-/// tissue fits, the places of the skin to look at are written to NAME_refused.ply. Throws
+/// tissue fits, these places of the skin are written to NAME_refused.ply. Throws
 /// InputError. `watch` is told the share that is done, on rank 0. Collective.
 Job read_job(MPI_Comm comm, const std::filesystem::path& input,
              const std::function<void(double)>& watch = {},

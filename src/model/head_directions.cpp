@@ -84,8 +84,7 @@ std::optional<Vec3> facing_of_bones(const BoneGroup& upper, const BoneGroup& low
 /// a cheek.
 std::optional<Vec3> facing_of_patch(const SkinMesh& mesh, const Vec3& outward,
                                     const BoneGroup& upper, const BoneGroup& lower) {
-  Vec3 skin = Vec3::Zero();
-  for (const Vec3& x : mesh.points) skin += x / static_cast<double>(mesh.points.size());
+  const Vec3 skin = base::mean(mesh.points);
   const Vec3 bones = (upper.box.center() + lower.box.center()) / 2, normal = outward.normalized();
   const bool named_wrongly = upper.box.volume() < lower.box.volume();  // a jaw is the smaller one
   const BoneGroup& jaw = named_wrongly ? upper : lower;
@@ -105,8 +104,7 @@ std::vector<Vec3> those(const std::vector<Vec3>& points, const Keep& keep) {
 }  // namespace
 
 Mat3 scatter_of(const std::vector<Vec3>& points) {
-  Vec3 mean = Vec3::Zero();
-  for (const Vec3& x : points) mean += x / static_cast<double>(points.size());
+  const Vec3 mean = base::mean(points);
   Mat3 scatter = Mat3::Zero();
   for (const Vec3& x : points) scatter += (x - mean) * (x - mean).transpose();
   return scatter;
