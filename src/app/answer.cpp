@@ -24,7 +24,7 @@ std::string describe_answer(const Job& job, const SolvedSkin& skin, const std::v
   const surface::Surface& before = skin.initial();
   const Mat3 axes = scene::head_axes(landmarks);
   return describe_movement(places, axes, before, now) + " " +
-         describe_lips(landmarks, axes.row(2), before.points, now) +
+         describe_lips(landmarks, axes.row(2), before, now) +
          describe_trust(summary, discretization) + "\n" + describe_warnings(job);
 }
 

@@ -67,12 +67,13 @@ std::optional<std::pair<size_t, size_t>> parted_vertex(const Vec3& stomion,
   return std::nullopt;
 }
 
-/// Row of the point nearest to a place; 0 without points.
-size_t nearest_point(const Vec3& place, const std::vector<Vec3>& points) {
-  size_t nearest = 0;
-  for (size_t i = 1; i < points.size(); ++i)
-    if ((points[i] - place).squaredNorm() < (points[nearest] - place).squaredNorm()) nearest = i;
-  return nearest;
+/// Returns how far a point's triangles extend beyond it along `up`, mm, summed.
+double extent_above(size_t point, const Vec3& up, const surface::Surface& skin) {
+  double above = 0;
+  for (const Triangle& t : skin.triangles)
+    if (std::ranges::count(t, static_cast<int64_t>(point)) > 0)
+      for (const int64_t corner : t) above += up.dot(skin.points[corner] - skin.points[point]);
+  return above;
 }
 
 /// The movement of the skin's point nearest to a place, linear in its triangle.
@@ -114,17 +115,13 @@ std::string describe_movement(const std::vector<model::FacePlace>& places, const
 }
 
 std::string describe_lips(const scene::Landmarks& landmarks, const Vec3& up,
-                          const std::vector<Vec3>& initial, const std::vector<Vec3>& moved) {
-  for (const char* name : {"stomion", "upper_lip", "lower_lip"})
-    if (!landmarks.contains(name)) return "";
-  const auto pair = parted_vertex(landmarks.at("stomion"), initial);
+                          const surface::Surface& initial, const std::vector<Vec3>& moved) {
+  if (!landmarks.contains("stomion")) return "";
+  const auto pair = parted_vertex(landmarks.at("stomion"), initial.points);
   if (!pair) return "";
-  const auto way = [&](size_t i) { return Vec3(moved[i] - initial[i]); };
-  const Vec3 upper = way(nearest_point(landmarks.at("upper_lip"), initial)),
-             lower = way(nearest_point(landmarks.at("lower_lip"), initial));
-  Vec3 apart = way(pair->first) - way(pair->second);
-  if (apart.dot(upper - lower) < 0) apart = -apart;  // the first one is of the lower lip
-  const double gap = apart.dot(up);
+  const auto [one, other] = *pair;
+  const bool first_is_upper = extent_above(one, up, initial) > extent_above(other, up, initial);
+  const double gap = (first_is_upper ? 1 : -1) * up.dot(moved[one] - moved[other]);
   if (gap < closed) return "Lips closed. ";
   return fmt::format("Lips {:.1f} mm apart at stomion, together before. ", gap);
 }

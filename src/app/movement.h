@@ -14,11 +14,10 @@ std::string describe_movement(const std::vector<model::FacePlace>& places, const
                               const surface::Surface& initial, const std::vector<Vec3>& moved);
 
 /// Returns how far parted lips are apart along `up`, a unit vector, in the middle of the mouth, in
-/// one sentence with a blank after it. Empty without the landmarks stomion, upper_lip and
-/// lower_lip, and where the skin is not parted within 8 mm of stomion. `initial` and `moved`
-/// [points] of the skin, mm.
+/// one sentence with a blank after it. Empty without the landmark stomion, and where the skin is
+/// not parted within 8 mm of it. `initial`: the skin; `moved` [points] of it, mm.
 std::string describe_lips(const scene::Landmarks& landmarks, const Vec3& up,
-                          const std::vector<Vec3>& initial, const std::vector<Vec3>& moved);
+                          const surface::Surface& initial, const std::vector<Vec3>& moved);
 
 /// Returns how far the face is from rest and, where that was estimated (`discretization`, mm; else
 /// negative), from the continuum.

@@ -7,22 +7,25 @@
 namespace repose::app {
 namespace {
 
-/// Skin points of the upper and the lower lip, and two at stomion, of which the first is the
-/// upper's.
-const std::vector<Vec3> skin = {{0, -90, 10}, {0, -90, -10}, {1, -90, 0}, {1, -90, 0}};
-const scene::Landmarks marks = {
-    {"upper_lip", {0, -90, 10}}, {"lower_lip", {0, -90, -10}}, {"stomion", {0, -90, 0}}};
+/// A triangle of the upper and one of the lower lip that share the place of a corner at stomion.
+const surface::Surface skin = {
+    "",
+    {{0, -90, 10}, {4, -90, 10}, {0, -90, -10}, {4, -90, -10}, {1, -90, 0}, {1, -90, 0}},
+    {{0, 4, 1}, {2, 3, 5}}};
+const scene::Landmarks marks = {{"stomion", {0, -90, 0}}};
 
 const Vec3 up(0, 0, 1);
 
-/// The sentence for lips that move so, with either one's point at stomion first.
+/// The sentence for points at stomion that move so, with either one first.
 std::string after(const Vec3& upper, const Vec3& lower) {
-  const std::vector<Vec3> upper_first = {skin[0] + upper, skin[1] + lower, skin[2] + upper,
-                                         skin[3] + lower};
-  std::vector<Vec3> lower_first = upper_first;
-  std::swap(lower_first[2], lower_first[3]);
-  const std::string text = describe_lips(marks, up, skin, upper_first);
-  EXPECT_EQ(describe_lips(marks, up, skin, lower_first), text);
+  std::vector<Vec3> moved = skin.points;
+  moved[4] += upper;
+  moved[5] += lower;
+  const std::string text = describe_lips(marks, up, skin, moved);
+  surface::Surface lower_first = skin;
+  std::swap(lower_first.triangles[0][1], lower_first.triangles[1][2]);
+  std::swap(moved[4], moved[5]);
+  EXPECT_EQ(describe_lips(marks, up, lower_first, moved), text);
   return text;
 }
 
@@ -31,14 +34,23 @@ TEST(LipGap, IsMeasuredUpwards) {
   EXPECT_EQ(after({0, 0, 0}, {0, 0, -1}), "Lips 1.0 mm apart at stomion, together before. ");
 }
 
+/// The landmarks of lips that hardly move would not show which of the two points is the upper.
+TEST(LipGap, ASmallGapAndAnOverlapAreNotConfused) {
+  EXPECT_EQ(after({0, 0, 0.125}, {0, 0, 0}), "Lips 0.1 mm apart at stomion, together before. ");
+  EXPECT_EQ(after({0, 0, -0.125}, {0, 0, 0}), "Lips closed. ");
+}
+
 TEST(LipGap, LipsThatSlideAlongEachOtherAreClosed) {
   EXPECT_EQ(after({0, 0, 0}, {0, -4, 0}), "Lips closed. ");
   EXPECT_EQ(after({0, 0, 0}, {0, -4, 0.4}), "Lips closed. ");  // the lower one in front, and above
 }
 
-TEST(LipGap, NeedsPartedLipsAndTheirLandmarks) {
-  EXPECT_EQ(describe_lips({}, up, skin, skin), "");
-  EXPECT_EQ(describe_lips(marks, up, {skin[0], skin[1], skin[2]}, {skin[0], skin[1], skin[2]}), "");
+TEST(LipGap, NeedsPartedLipsAndTheirLandmark) {
+  EXPECT_EQ(describe_lips({}, up, skin, skin.points), "");
+  surface::Surface joined = skin;
+  joined.points.pop_back();
+  joined.triangles[1][2] = 4;
+  EXPECT_EQ(describe_lips(marks, up, joined, joined.points), "");
 }
 
 /// A place in the middle of an edge between a vertex that moves and one that does not.
