@@ -1,8 +1,8 @@
 #include "bone_through_skin.h"
 
 #include <algorithm>
-#include <array>
 #include <optional>
+#include <vector>
 
 #include "report.h"
 #include "repose/model/instruments.h"
@@ -14,11 +14,23 @@ namespace repose::app {
 namespace {
 
 constexpr double reported = 0.3;  // mm
+constexpr double sample = 0.5;    // mm, between points at which depths are taken
+constexpr int most_parts = 16;    // of an edge
 
-/// The middles of a triangle and of its edges.
-std::array<Vec3, 4> between(const surface::Corners& corner) {
+/// Returns a triangle's points i a + j b + k c with i + j + k = 1, multiples of 1/parts, without
+/// its corners.
+std::vector<Vec3> between(const surface::Corners& corner, int parts) {
   const auto& [a, b, c] = corner;
-  return {(a + b + c) / 3, (a + b) / 2, (b + c) / 2, (c + a) / 2};
+  std::vector<Vec3> at;
+  for (int i = 0; i < parts; ++i)
+    for (int j = 0; i + j <= parts && j < parts; ++j)
+      if (i + j > 0) at.push_back(c + (i * (a - c) + j * (b - c)) / parts);
+  return at;
+}
+
+double longest_edge(const surface::Corners& corner) {
+  const auto& [a, b, c] = corner;
+  return std::max({(a - b).norm(), (b - c).norm(), (c - a).norm()});
 }
 
 struct Through {
@@ -36,23 +48,26 @@ Through pass_through(const surface::Surface& initial, const surface::Surface& no
   Through found;
   int64_t hint = -1;
   for (const Triangle& triangle : now.triangles) {
-    const auto at = between(surface::corners(now, triangle));
-    const double reach = 2 * (at[1] - at[2]).squaredNorm() + 2 * (at[2] - at[3]).squaredNorm();
-    hint = near.any_within(at[0], reach, hint);
+    const surface::Corners corner = surface::corners(now, triangle);
+    const double longest = longest_edge(corner);
+    hint = near.any_within(corner[0], longest * longest, hint);
     if (hint < 0) continue;
     if (!depth) depth.emplace(bone);
-    const auto before = between(surface::corners(initial, triangle));
+    const int parts = std::clamp(static_cast<int>(longest / sample), 2, most_parts);
+    const auto at = between(corner, parts),
+               before = between(surface::corners(initial, triangle), parts);
     double deepest = reported;
     for (size_t k = 0; k < at.size(); ++k) {
       double deeper = depth->at(at[k]);
       if (deeper > deepest) deeper -= depth->at(before[k]);
-      deepest = std::max(deepest, deeper);
+      if (deeper <= deepest) continue;
+      deepest = deeper;
+      if (deeper > found.depth) {
+        found.depth = deeper;
+        found.where = at[k];
+      }
     }
-    if (deepest <= reported) continue;
-    ++found.triangles;
-    if (deepest <= found.depth) continue;
-    found.depth = deepest;
-    found.where = at[0];
+    found.triangles += deepest > reported;
   }
   return found;
 }
