@@ -175,7 +175,8 @@ class Handler(http.server.BaseHTTPRequestHandler):
         latest = session.verifications[-1:]
         said = {"text": "", "good": True}
         if latest:
-            said = {"text": latest[0].message, "good": latest[0].agrees, "plan": latest[0].plan}
+            said = {"text": latest[0].message, "good": latest[0].agrees, "plan": latest[0].plan,
+                    "lower": latest[0].lower}
         if session.scene_changed:
             said = {"text": "the scene or one of its files has changed on disk: the faces are those of the "
                             "scene as it was; start live.py again", "good": False}

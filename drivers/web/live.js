@@ -45,6 +45,7 @@ class Planner {
     this.future = [];
     this.reference = null;  // {plan, position, columns}: the latest solved with tangents
     this.exact = null;      // {plan, position}: the latest solved
+    this.lower = null;      // plan that was solved from the initial state
     this.asked = this.overtaken = 0;
     this.solved = arrays.position;  // initial positions of the skin that is solved
     // It has no cuts: lips that part are shown on the skin that is solved.
@@ -234,6 +235,7 @@ class Planner {
   change(plan, remembered = true) {
     const before = this.plan;
     this.plan = plan;
+    this.lower = null;
     this.overtaken = 0;
     if (remembered) this.remember(before);
     this.showHistory();
@@ -316,14 +318,22 @@ class Planner {
     this.timer = setTimeout(() => this.solve(false), 60);
   }
 
-  async solve(tangents) {
+  // Solves this plan from the initial state, where that was found to end at less energy.
+  takeLower() {
+    if (isSame(this.lower, this.plan)) return;
+    this.lower = copyOf(this.plan);
+    clearTimeout(this.timer);
+    this.solve(true, {base: "rest", other_rest: true});
+  }
+
+  async solve(tangents, start = {}) {
     const number = ++this.asked, plan = copyOf(this.plan);
     const current = () => number === this.asked && isSame(plan, this.plan);
     try {
-      const answer = await ask("/solve", {plan, tangents, summary: tangents});
+      const answer = await ask("/solve", {plan, tangents, summary: tangents, ...start});
       if (!answer.byteLength) {  // overtaken by another plan, of this window or of another one
         const pause = PATIENCE * 2 ** this.overtaken++ * (1 + Math.random());
-        if (current()) this.timer = setTimeout(() => this.solve(tangents), pause);
+        if (current()) this.timer = setTimeout(() => this.solve(tangents, start), pause);
         return;
       }
       this.overtaken = 0;
@@ -337,9 +347,10 @@ class Planner {
       byId("angles").textContent = (head.angles ?? []).map(({name, before, after}) =>
         `${name} ${after.toFixed(1)}° (before ${before.toFixed(1)}°)`).join("; ");
       byId("cautions").textContent = head.cautions.join("\n");
+      const lower = start.base ? ", of less energy" : "";
       const warnings = head.cautions.length ? `, warnings: ${head.cautions.length}` : "";
       if (!head.converged) this.mark("failed", `not converged: ${head.reason}`);
-      else this.mark("exact", `exact to ${Math.max(head.error, 0.001).toFixed(3)} mm${warnings}`);
+      else this.mark("exact", `exact to ${Math.max(head.error, 0.001).toFixed(3)} mm${lower}${warnings}`);
       if (!tangents) this.timer = setTimeout(() => this.solve(true), 150);
     } catch (error) {
       if (current()) this.mark("failed", error.message);
@@ -455,9 +466,10 @@ class Planner {
 // Shows how this plan was verified from a cold start, or that the scene has changed.
 async function showNotice() {
   try {
-    const {text, good, plan} = JSON.parse(new TextDecoder().decode(await ask("/notice")));
+    const {text, good, plan, lower} = JSON.parse(new TextDecoder().decode(await ask("/notice")));
     byId("notice").textContent = !plan || planner.isAt(plan) ? text : "";
     byId("notice").className = good ? "" : "bad";
+    if (lower && planner.isAt(plan)) planner.takeLower();
   } catch (error) {
     byId("notice").textContent = `the server of this page does not answer: ${error.message}`;
     byId("notice").className = "bad";

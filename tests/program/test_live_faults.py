@@ -111,6 +111,7 @@ def test_a_face_that_differs_is_reported(shift, converged, words):
     verifier.wait()
     (one,) = verifier.outcomes
     assert words in one.message and one.agrees == (not shift and converged) and cold[0].closed
+    assert one.lower == bool(shift)
 
 
 def test_a_verification_under_way_is_abandoned_at_the_end(small):

@@ -143,6 +143,22 @@ ask = (path, given) => path === "/solve" && pauses.length < 4 ? new ArrayBuffer(
   await exact();
   return {pauses};
 })()"""
+# Verifications find less energy at the plan on which the page rests.
+LOWER = """
+const starts = [], request = ask;
+ask = (path, given) => {
+  if (path === "/notice")
+    return new TextEncoder().encode(JSON.stringify({text: "", good: false, plan: planner.plan, lower: true}));
+  if (path === "/solve") starts.push([given.base ?? "", given.other_rest ?? false]);
+  return request(path, given);
+};
+(async () => {
+  while (!window.planner || !planner.reference) await sleep(1);
+  const before = starts.length;
+  for (let times = 0; times < 3; ++times) await showNotice();
+  while (!mark().textContent.includes(" mm, of less energy")) await sleep(30);
+  return {starts: starts.slice(before)};
+})()"""
 WARNED = """
 (async () => {
   const found = {}, told = () => document.getElementById("cautions").textContent;
@@ -370,6 +386,10 @@ def test_a_result_is_called_without_its_ending_or_with_it(live, served):
 def test_windows_that_overtake_each_other_wait_longer_and_longer(live, served):
     pauses = browsed(live, served, OVERTAKEN, "1200,900")["pauses"]
     assert len(pauses) >= 4 and all(1000 * 2**k <= pause <= 2000 * 2**k for k, pause in enumerate(pauses[:4])), pauses
+
+
+def test_the_page_takes_the_rest_position_of_less_energy_once(live, served):
+    assert browsed(live, served, LOWER, "1200,900")["starts"] == [["rest", True]]
 
 
 def test_an_exact_face_has_the_warnings_of_its_summary(live, served):

@@ -16,6 +16,7 @@ class Verification:
     distance: float  # mm, largest over the skin
     agrees: bool
     message: str
+    lower: bool = False  # the other one has less energy
 
 
 class Verifier:
@@ -92,6 +93,7 @@ class Verifier:
             raise ValueError("the scene is another one now")
         apart = np.linalg.norm(face.position - position, axis=1)
         agrees = bool(face.converged and apart.max() <= 2 * accuracy + ROUNDING)
+        lower = face.converged and not agrees and face.info["energy"] < energy
         if not face.converged:
             message = f"not verified: the search from a cold start ended with {face.info['reason']}"
         elif agrees:
@@ -103,4 +105,4 @@ class Verifier:
             message = (f"NOT verified: a search from a cold start ends {apart.max():.2f} mm away, at "
                        f"{np.round(position[apart.argmax()]).astype(int).tolist()} mm, with an energy of "
                        f"{face.info['energy']:.4g} in place of {energy:.4g} N mm: there are two rest positions")
-        return Verification(plan, float(apart.max()), agrees, message)
+        return Verification(plan, float(apart.max()), agrees, message, lower)
