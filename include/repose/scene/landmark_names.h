@@ -37,8 +37,8 @@ Landmarks with_standard_names(const Landmarks& landmarks, const std::string& fil
 
 /// Returns the axes of a head as the rows left, back and up, by landmarks alone, so that they turn
 /// with the head: left from the right condyle to the left one, and the level at which the
-/// directions from the middle of the condyles to nasion and to the upper incisors rise by 14°
-/// together. Without one of these two the level is that of the scan, without condyles (or with one
+/// directions from the middle of the condyles to nasion and to the upper incisors rise by 14° in
+/// sum. Without one of these two the level is that of the scan, without condyles (or with one
 /// behind the other) all axes are.
 Mat3 head_axes(const Landmarks& landmarks);
 
