@@ -1,5 +1,6 @@
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <map>
 #include <set>
 
@@ -32,28 +33,41 @@ class CutFaceBuilder {
     find_skin_beside();
   }
 
+  /// Keeps one side off the other, and the other's edges off the one: an edge would pass between
+  /// places of a side.
   void build(CutFaces& cut_faces) const {
-    const auto columns = static_cast<int64_t>(cut_.columns.size());
-    const int64_t rows = deepest_ + 1 + beyond + (through_ ? beyond : 0);
-    cut_faces.size.push_back({columns, rows});
     if (cut_faces.begin.empty()) cut_faces.begin.push_back(0);
-    const bool swapped = faces_away();
-    for (const bool left : {swapped, !swapped})
-      for (int64_t c = 0; c < columns * rows; ++c) {
-        for (const auto& [point, weight] :
-             control(c / rows, static_cast<int>(c % rows) - beyond, left)) {
-          cut_faces.point.push_back(point);
-          cut_faces.weight.push_back(weight);
-        }
-        cut_faces.begin.push_back(static_cast<int64_t>(cut_faces.point.size()));
-      }
-    for (int64_t c = 0; c < columns * rows; ++c)
-      cut_faces.area.push_back(area(c / rows, static_cast<int>(c % rows) - beyond));
+    const bool left = faces_away();
+    add_nets(left, false, cut_faces);
+    add_nets(!left, true, cut_faces);
   }
 
  private:
   static constexpr int beyond = 2;  // rows, round either edge
   using Shares = std::vector<std::pair<int64_t, double>>;
+
+  /// Adds the net of a side that is kept off, with its edges alone or with all its places, and that
+  /// of the surface. Seen from the other side columns are in reverse order, so that normals, along
+  /// × inwards, point out of the surface.
+  void add_nets(bool kept_off, bool edges_alone, CutFaces& cut_faces) const {
+    const auto columns = static_cast<int64_t>(cut_.columns.size());
+    const int64_t rows = deepest_ + 1 + beyond + (through_ ? beyond : 0);
+    const auto column = [&](int64_t c) { return edges_alone ? columns - 1 - c / rows : c / rows; };
+    const auto layer = [&](int64_t c) { return static_cast<int>(c % rows) - beyond; };
+    cut_faces.size.push_back({columns, rows});
+    for (const bool left : {kept_off, !kept_off})
+      for (int64_t c = 0; c < columns * rows; ++c) {
+        for (const auto& [point, weight] : control(column(c), layer(c), left)) {
+          cut_faces.point.push_back(point);
+          cut_faces.weight.push_back(weight);
+        }
+        cut_faces.begin.push_back(static_cast<int64_t>(cut_faces.point.size()));
+      }
+    for (int64_t c = 0; c < columns * rows; ++c) {
+      const bool touches = !edges_alone || layer(c) == 0 || layer(c) == deepest_;
+      cut_faces.area.push_back(touches ? area(column(c), layer(c)) : 0);
+    }
+  }
 
   int64_t node(int64_t column, int layer) const { return row_of_.at({column, layer}); }
   int64_t side_of(int64_t row, bool left) const {
@@ -77,7 +91,8 @@ class CutFaceBuilder {
 
   /// Layers −1 and −2, and as many beyond the deepest, lie round the edge, on the skin or inside.
   Shares control(size_t i, int layer, bool left) const {
-    constexpr double step = 0.75;  // edges of the skin
+    // edges of the skin, from the cut's: the nearer the first row, the sharper the edge
+    constexpr std::array distance = {0.2, 0.95};
     const int inner = std::clamp(layer, 0, deepest_);
     Shares shares = {{side_of(node(cut_.columns[i], inner), left), 1.0}};
     if (layer == inner) return shares;
@@ -85,8 +100,8 @@ class CutFaceBuilder {
     Vec3 length = Vec3::Zero();
     for (const auto& [point, weight] : direction) length += weight * position(point);
     for (const auto& [point, weight] : direction)
-      shares.emplace_back(point,
-                          std::abs(layer - inner) * step * cut_.edge / length.norm() * weight);
+      shares.emplace_back(
+          point, distance[std::abs(layer - inner) - 1] * cut_.edge / length.norm() * weight);
     return shares;
   }
   /// The way from an edge's points to those beside them, as a mean over the columns nearby.

@@ -6,6 +6,7 @@ import h5py
 import numpy as np
 import pytest
 
+import overlap
 from conftest import PROJECT, runner, shipped, some_on_ranks
 from heads import write
 from tissue import last, model_of, skin
@@ -161,8 +162,7 @@ def test_points_go_round_edges_from_rest_positions_of_hardly_more_energy_too(fol
 @real_head
 @pytest.mark.long
 def test_fused_lips_across_an_incisor_rest_where_they_have_less_energy(folder, environment):
-    """On the other side of its edge, 1 mm away, the lower lip has 0.026 N mm more. No point goes round it
-    alone, and programs from the prediction do not lead there."""
+    """On the other side of its edge the lower lip has more."""
     run = runner(folder, environment)
     scene = (folder / "real_head_genioplasty.yaml").read_text()
     moves = "  - {bone: mandible, translate: [0, -5, 0]}\n  - {bone: chin, translate: [0, -4.9, 0]}\n"
@@ -170,9 +170,9 @@ def test_fused_lips_across_an_incisor_rest_where_they_have_less_energy(folder, e
     for ranks in (1, 2):
         done = run("repose-solve", "lips.yaml", "-accuracy", 0.01, "-output", "lips", ranks=ranks)
         assert (done.returncode, done.stderr) == (0, ""), done
-        assert last(folder / "lips.h5")["objective"] == pytest.approx(19.872, abs=2e-3)
+        assert last(folder / "lips.h5")["objective"] == pytest.approx(19.887, abs=2e-3)
         (distance, *_), = np.array(OTHER.findall(done.stdout), float)
-        assert distance == pytest.approx(0.97, abs=0.1)
+        assert distance == pytest.approx(0.79, abs=0.1)
 
 
 def solve_implant(folder, environment, half_axes, center, forward):
@@ -251,11 +251,13 @@ def test_negative_curvature_of_contact_does_not_make_steps_short(folder, environ
 def test_a_split_jaw_with_parted_lips_is_solved_and_nothing_is_folded(solve):
     """Points at an edge also go to its other side where that takes two searches, to 0.0012 N mm less."""
     file = solve("real_head_split")
-    assert last(file)["objective"] < 11.704
+    assert last(file)["objective"] < 11.7598
     assert last(file)["inverted_prisms"] == 0
     places, moved = skin(file)
     chin = np.linalg.norm(places - [3.3, -303.9, 343.2], axis=1) < 8
     assert moved[chin][:, 1].mean() == pytest.approx(-6, rel=0.25)
+    deep = overlap.depths(file)
+    assert deep.max() < 0.4 and (deep > 0.2).sum() <= 8
 
 
 @real_head
