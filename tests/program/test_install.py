@@ -114,14 +114,35 @@ def test_a_program_of_ones_own_builds_against_it(prefix, call, tmp_path):
     assert np.linalg.norm(moved - still, axis=1).max() > 0.01
 
 
-def test_the_batch_script_takes_an_unfinished_run_up_again(prefix, call, tmp_path):
+@pytest.fixture
+def batch(prefix, call, tmp_path):
+    """batch(arguments …, variable=value …) runs the batch script, with an srun that notes its calls."""
     (tmp_path / "srun").write_text('#!/bin/sh\necho "$@" >> calls\nexec "$@" $MORE\n')
     (tmp_path / "srun").chmod(0o755)
-    script, scene = prefix / "share/repose/repose.slurm", prefix / "share/repose/meshes" / SCENE
     path = f"{tmp_path}:{prefix / 'bin'}:/usr/bin:/bin"
-    first = call("bash", script, scene, PATH=path, MORE="-time_limit 0")
+    return lambda *scenes, **more: call("bash", prefix / "share/repose/repose.slurm", *scenes, PATH=path, **more)
+
+
+def test_the_batch_script_takes_an_unfinished_run_up_again(prefix, batch, tmp_path):
+    scene = prefix / "share/repose/meshes" / SCENE
+    first = batch(scene, MORE="-time_limit 0")
     assert first.returncode == 2, first.stderr
-    assert call("bash", script, scene, "missing.yaml", PATH=path, MORE="").returncode == 1
+    assert batch(scene, "missing.yaml").returncode == 1
     calls = (tmp_path / "calls").read_text().splitlines()
     assert [" -restart " in line for line in calls] == [False, True, False]
     assert last(tmp_path / "paper_jaw_advance.h5")["load"] == 1
+
+
+def test_the_batch_script_overwrites_no_result_of_another_scene(prefix, batch, tmp_path):
+    shutil.copytree(prefix / "share/repose/meshes", tmp_path / "a")
+    result = tmp_path / "paper_jaw_advance.h5"
+    twice = batch(f"a/{SCENE}", f"b/{SCENE}")
+    assert twice.returncode == 1 and "more than one scene has the name paper_jaw_advance" in twice.stderr
+    assert batch().returncode == 1 and not result.exists()
+    (tmp_path / "a b").symlink_to("a")
+    assert batch(f"a b/{SCENE}", MORE="-time_limit 0").returncode == 2
+    before = result.read_bytes()
+    other = batch(f"a/{SCENE}")
+    assert other.returncode == 1 and f"paper_jaw_advance.h5 is no result of \"repose-solve a/{SCENE}\"" in other.stderr
+    assert result.read_bytes() == before
+    assert batch(f"a b/{SCENE}").returncode == 0 and last(result)["load"] == 1
