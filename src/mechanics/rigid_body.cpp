@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <queue>
 
 namespace repose::mechanics {
 
@@ -96,16 +97,36 @@ double deepest_in(const scene::Box& box, double at_most) {
   return std::min(box.size.minCoeff() / 2, at_most);
 }
 double deepest_in(const scene::HalfSpace&, double at_most) { return at_most; }
+
+/// A box of space; a point in it is at most `bound` mm deep.
+struct Region {
+  double bound;
+  Vec3 center, half;
+  bool operator<(const Region& other) const { return bound < other.bound; }
+};
+
+/// Branch and bound: a distance changes by no more than the way. A plate needs many regions to
+/// prove that it is nowhere deeper, but few to find its depth, so that `most` of them are enough.
 double deepest_in(const surface::DistanceField& field, double at_most) {
-  constexpr int steps = 8;
+  constexpr int most = 1 << 16;
+  constexpr double near = 1.02;  // times the depth
+  if (field.surface().triangles.empty()) return 0;
+  Eigen::AlignedBox3d box;
+  for (const Vec3& point : field.surface().points) box.extend(point);
   double deepest = 0;
-  const surface::Surface& mesh = field.surface();
-  for (const auto& t : mesh.triangles) {
-    const std::array<Vec3, 3> x = base::pick(mesh.points, t);
-    const Vec3 normal = (x[1] - x[0]).cross(x[2] - x[0]).normalized();
-    for (int k = -steps; k <= steps && deepest < at_most; ++k)
-      deepest = std::max(
-          deepest, -field.value((x[0] + x[1] + x[2]) / 3 + k * (1.2 * at_most / steps) * normal));
+  std::priority_queue<Region> regions;
+  const auto add = [&](const Vec3& center, const Vec3& half) {
+    const double depth = -field.value(center);
+    deepest = std::max(deepest, depth);
+    regions.push({depth + half.norm(), center, half});
+  };
+  add(box.center(), box.sizes() / 2);
+  for (int n = 0; n < most && deepest < at_most && regions.top().bound > near * deepest; ++n) {
+    auto [bound, center, half] = regions.top();
+    regions.pop();
+    int axis = 0;
+    half[axis] = half.maxCoeff(&axis) / 2;
+    for (const int side : {-1, 1}) add(center + side * half[axis] * Vec3::Unit(axis), half);
   }
   return std::min(deepest, at_most);
 }

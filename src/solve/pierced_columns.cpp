@@ -146,6 +146,11 @@ PiercedColumns find_columns(discrete::Objective& objective, const std::vector<Ro
   return found;
 }
 
+/// Longest edge of the upper triangle of a prism.
+double longest_edge(const std::array<Vec3, 6>& x) {
+  return std::max({(x[1] - x[0]).norm(), (x[2] - x[1]).norm(), (x[0] - x[2]).norm()});
+}
+
 /// The deepest sample in a body of lines through a prism, about `apart` mm from one another, from
 /// its upper to its lower triangle. Of a prism at the skin they begin a quarter of its longest edge
 /// below: so far the plane triangle may cut through a ball that its corners touch.
@@ -153,8 +158,7 @@ Sample deepest_in_prism(const std::array<Vec3, 6>& x, bool at_skin, double apart
                         const Sampling& rule, const mechanics::RigidBody& body) {
   constexpr int finest = 16;
   constexpr double cut_share = 0.25;
-  const double longest =
-      std::max({(x[1] - x[0]).norm(), (x[2] - x[1]).norm(), (x[0] - x[2]).norm()});
+  const double longest = longest_edge(x);
   const double reach = longest + (x[3] - x[0]).norm();
   if (body.lower_bound(body.beside((x[0] + x[5]) / 2), reach) >= reach) return {};
   const int parts = std::clamp(static_cast<int>(std::ceil(longest / apart)), 2, finest);
@@ -193,8 +197,7 @@ void add_prisms(discrete::Objective& objective, bool bones, int32_t last, Pierce
     for (int64_t m = 0; m < part.owned_prisms; ++m) {
       const std::array<int64_t, 6> corners = from_the_top(points, part.model.prisms.points[m]);
       const std::array<Vec3, 6> now = base::pick(positions.local(), corners);
-      if (!model::touches_soft_tissue(points, corners) || depth >= (now[1] - now[0]).norm())
-        continue;
+      if (!model::touches_soft_tissue(points, corners) || depth >= longest_edge(now)) continue;
       if (bones && points.layer[corners[3]] == last) continue;
       const bool at_skin = points.layer[corners[0]] == 0;
       const auto in = [&](const std::array<Vec3, 6>& x, const mechanics::RigidBody& body) {

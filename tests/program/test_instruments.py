@@ -251,3 +251,19 @@ def test_an_instrument_thinner_than_a_layer_does_not_pass_the_skin_unseen(slab, 
     result, _ = slab(f"{{{rod}}}", 0.05, 0, status=2)
     assert re.search(r"pierced by instrument +\d+ (columns|prisms between columns), up to 0\.\d+ mm deep",
                      result.stdout)
+
+
+def test_what_an_instrument_pierces_does_not_depend_on_the_order_of_corners(slab, tmp_path):
+    """The rod is thicker than the short edges of the skin, and goes in between its long ones."""
+    x, y = np.arange(-20, 20.1, 1.6), np.arange(-32, 33, 8.0)
+    corner = np.arange(len(x) * len(y), dtype=np.int32).reshape(len(y), -1)[:-1, :-1].ravel()
+    right, up = corner + 1, corner + len(x)
+    triangles = np.concatenate([np.column_stack([right, up + 1, corner]), np.column_stack([up, corner, up + 1])])
+    rod = "{capsule: {from: [-6, 4, 16.9], to: [6, 7, 16.9], radius: 1.7}, push: [0, 0, -4], skin: stick}"
+    counts = set()
+    for first in range(3):
+        write(tmp_path / "slab_skin.ply", np.array([(a, b, 15) for b in y for a in x], float),
+              np.roll(triangles, first, axis=1))
+        result, _ = slab(rod, 0.01, 0, status=2)
+        counts.add(re.search(r"pierced by instrument +(\d+) prisms between columns", result.stdout)[1])
+    assert len(counts) == 1, counts

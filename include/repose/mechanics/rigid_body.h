@@ -49,8 +49,7 @@ class RigidBody {
   /// A direction in space in the body's own axes, and its inverse.
   Vec3 own_direction(const Vec3& direction) const { return rotation_.transpose() * direction; }
   Vec3 turned(const Vec3& own) const { return rotation_ * own; }
-  /// Returns the depth of the deepest place inside, mm, at most `at_most`. That of a mesh is found
-  /// along the normals of its triangles.
+  /// Returns the depth of the deepest place inside, mm, at most `at_most`; that of a mesh to 2 %.
   double deepest(double at_most) const;
 
  private:

@@ -171,6 +171,29 @@ TEST(BodyContact, StatesDistancesBeyondAMillimeterExactly) {
   EXPECT_EQ(loop.gaps()[2], 6);
 }
 
+/// Halves every triangle at its first edge.
+surface::Surface halved(const surface::Surface& mesh) {
+  surface::Surface result{mesh.name, mesh.points, {}};
+  for (const auto& [a, b, c] : mesh.triangles) {
+    const auto middle = std::ssize(result.points);
+    result.points.push_back((result.points[a] + result.points[b]) / 2);
+    result.triangles.push_back({c, a, middle});
+    result.triangles.push_back({b, c, middle});
+  }
+  return result;
+}
+
+TEST(RigidBody, DepthDoesNotDependOnTriangles) {
+  for (const Vec3& half : {Vec3(7, 7, 7), Vec3(20, 1.5, 1.5), Vec3(30, 0.8, 20)}) {
+    surface::Surface mesh = box(half);
+    for (int k = 0; k < 3; ++k, mesh = halved(halved(mesh))) {
+      const RigidBody body(surface::DistanceField(mesh, 0.5, 6), -1, Vec3::Zero());
+      EXPECT_NEAR(body.deepest(10), half.minCoeff(), 0.2);  // the spline is rounded
+      EXPECT_EQ(body.deepest(0.3), 0.3);
+    }
+  }
+}
+
 TEST(BodyContact, MeasuresPointsThatBeganDeepInsideAMeshFromTheSideTheyAreOn) {
   constexpr double began = -2.5;  // mm
   const RigidBody body(surface::DistanceField(box({5, 4, 3}), 0.5, 6), -1, Vec3::Zero());
