@@ -48,7 +48,10 @@ def verdict(result):
     """One sentence: whether the face is the model's answer, and how near."""
     end, error = result.end, float(result.end["displacement_error"])
     near = f"within {error:.2g} mm of" if math.isfinite(error) else "at an unknown distance from"
-    if end["converged"] and end["load"] == 1:
+    if end["load"] < 1:
+        return (f"NOT FINISHED: the face shown is at {100 * end['load']:.4g} % of the planned motion, {near} rest "
+                "there. Do not plan by it.")
+    if end["converged"]:
         return f"The computation is finished: this face is {near} the answer of the model."
     return f"NOT FINISHED: the face shown is {near} the answer of the model. Do not plan by it."
 
@@ -56,9 +59,8 @@ def verdict(result):
 def cautions(result, known, parts, guessed):
     """Yields a sentence for each reason not to trust the face."""
     end = result.end
-    if not end["converged"] or end["load"] < 1:
-        yield (f"The run did not reach its accuracy: {end['reason']}. The bones have made "
-               f"{100 * end['load']:.0f} % of the planned motion.")
+    if not end["converged"]:
+        yield f"The run did not reach its accuracy: {end['reason']}."
     if end["displacement_error"] > LARGE_ERROR:
         yield "The face is not known to half a millimeter."
     if end.get("smallest_eigenvalue", 1) <= 0:

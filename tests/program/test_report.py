@@ -512,6 +512,16 @@ def test_a_bad_end_is_warned_of(report, run, tmp_path):
     assert "NOT FINISHED" in page.text["b"] and "did not reach its accuracy" in page.text["p"]
 
 
+def test_a_rest_position_on_the_way_is_no_answer_of_the_model(report, opened, tmp_path):
+    shutil.copy(opened, tmp_path / "part.h5")
+    with h5py.File(tmp_path / "part.h5", "r+") as h5:
+        h5["step"][sorted(h5["step"])[-1]].attrs["load"] = 0.004
+    page = page_of(report, tmp_path, tmp_path / "part.h5")
+    assert re.search(r"NOT FINISHED: the face shown is at 0.4 % of the planned motion, within \S+ mm of rest there",
+                     page.text["b"])
+    assert "answer of the model" not in page.text["b"] and "its accuracy" not in page.text["p"]
+
+
 def test_mistakes_are_one_line(report, opened, tmp_path):
     (tmp_path / "bad.json").write_text("{")
     (tmp_path / "none.h5").write_bytes(b"")
