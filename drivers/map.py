@@ -235,6 +235,8 @@ def main():
         chosen = arguments()
         with repose.Session(chosen.scene) as session:
             box = PlanBox([piece.name for piece in session.pieces], session.box)
+            if not box.coordinates:
+                refuse(f"{chosen.scene}: plan.box: all numbers are 0, so there is no other plan to map; make one larger")
             key = f"{repose.Scene(chosen.scene).fingerprint(repose.session.find_program())}_{chosen.accuracy:g}"
             store = SampleStore(chosen.cache, key)
             (solve_plan if chosen.plan else make_page)(chosen, session, box, store)

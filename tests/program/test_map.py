@@ -119,6 +119,15 @@ def test_refusals_are_one_line(made, script, arguments, words):
     assert len(message.stderr.splitlines()) == 1 and message.stderr.startswith("map.py: ")
 
 
+def test_a_box_without_width_is_refused_before_a_solve(script, tmp_path):
+    scene = one_piece(tmp_path)
+    scene.write_text(re.sub("box: .*", "box: {translate: [0, 0, 0], rotate: [0, 0, 0]}", scene.read_text())
+                     .replace("[0, -2, 0]", "[0, 0, 0]"))
+    message = script(scene)
+    assert message.returncode == 1 and f"{scene}: plan.box: all numbers are 0" in message.stderr, message
+    assert len(message.stderr.splitlines()) == 1 and not list(tmp_path.rglob("*.npz"))
+
+
 def test_sliders_move_the_face_as_python_does(made):
     scene, _ = made
     box, plan_map = stored_map(scene)
