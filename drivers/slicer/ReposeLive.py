@@ -2,6 +2,7 @@
 their transforms are moved (docs/guide/slicer.md). Nothing is compiled or installed into Slicer; the
 solver is the program repose-live."""
 
+import os
 import pathlib
 import sys
 
@@ -141,8 +142,8 @@ class ReposeLiveWidget(ScriptedLoadableModuleWidget):
         self.tell("building the model …")
         slicer.app.processEvents()
         try:
-            self.follower = start(self.path.text, self.tell)
-        except (repose.Refused, OSError) as reason:
+            self.follower = start(os.path.expanduser(self.path.text), self.tell)
+        except (ValueError, OSError) as reason:
             return self.tell(str(reason))
         self.button.text = "Stop"
 

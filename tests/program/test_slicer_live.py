@@ -161,6 +161,10 @@ def test_what_cannot_be_followed_is_said_in_a_line(started):
     assert lines[-1].startswith("chin: translate -30.0 mm is outside the plan's box (±8)")
     stand_in.move(chin, np.diag([2.0, 1, 1, 1]))
     assert "scales, shears or mirrors" in lines[-1]
+    nowhere = np.eye(4)
+    nowhere[0, 3] = np.nan
+    stand_in.move(chin, nowhere)
+    assert "not finite" in lines[-1]
     process = follower.session._process
     process.kill()
     process.wait()
@@ -202,6 +206,16 @@ def test_a_scene_without_a_plan_is_refused(started):
     widget.path.text = str(PROJECT / "meshes/head_genioplasty.yaml")
     widget.toggle()
     assert widget.follower is None and "the scene has no plan" in lines[-1]
+
+
+def test_a_file_that_is_no_text_is_refused(started, monkeypatch, tmp_path):
+    _, widget, lines = started
+    widget.stop()
+    (tmp_path / "scan.yaml").write_bytes(b"\0\1")
+    monkeypatch.setenv("HOME", str(tmp_path))
+    widget.path.text = "~/scan.yaml"
+    widget.toggle()
+    assert widget.follower is None and lines[-1].startswith(f"{tmp_path}/scan.yaml: not a text file"), lines
 
 
 @pytest.mark.quick

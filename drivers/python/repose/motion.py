@@ -26,8 +26,10 @@ def matrix_of(motion, centroid):
 
 
 def motion_of(matrix, centroid):
-    """The motion of a 4×4 matrix. ValueError where the matrix scales, shears or mirrors."""
+    """The motion of a 4×4 matrix. ValueError where the matrix scales, shears, mirrors or is not finite."""
     matrix = np.asarray(matrix, float)
+    if not np.isfinite(matrix).all():
+        raise ValueError("the transform has a number that is not finite; reset it")
     turn = matrix[:3, :3]
     if np.abs(turn.T @ turn - np.eye(3)).max() > RIGID or np.linalg.det(turn) < 0:
         raise ValueError("the transform scales, shears or mirrors; it may only move and turn")
