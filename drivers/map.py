@@ -164,7 +164,7 @@ def arguments():
     chosen.cache = chosen.cache or pathlib.Path(f"{stem}_map")
     require_folder(chosen.cache)
     inputs = repose.Scene(chosen.scene).files()
-    if chosen.plan:
+    if chosen.plan is not None:
         chosen.output = str(chosen.output or f"{stem}_plan").removesuffix(".h5")
         Target(f"{chosen.output}.h5", ".h5", inputs)
     else:
@@ -172,16 +172,24 @@ def arguments():
     return chosen
 
 
+def without_repetition(pairs):
+    """The object of JSON; ValueError where a name is given twice."""
+    names = [name for name, _ in pairs]
+    if repeated := {name for name in names if names.count(name) > 1}:
+        raise ValueError(f"'{min(repeated)}' is given more than once")
+    return dict(pairs)
+
+
 def read_plan(text):
     try:
-        plan = json.loads(text)
+        plan = json.loads(text, object_pairs_hook=without_repetition)
     except (ValueError, RecursionError) as reason:
         refuse(f"-plan: not JSON: {reason}")
     motions = plan.values() if isinstance(plan, dict) else [None]
     for motion in motions:
         numbers = list(motion.items()) if isinstance(motion, dict) else [("", None)]
         if not all(key in ("translate", "rotate") and isinstance(value, list) and len(value) == 3 and
-                   all(isinstance(x, (int, float)) and math.isfinite(x) for x in value) for key, value in numbers):
+                   all(type(x) in (int, float) and math.isfinite(x) for x in value) for key, value in numbers):
             refuse("-plan: give {PIECE: {\"translate\": [x, y, z], \"rotate\": [x, y, z]}}, mm and degrees")
     return plan
 
@@ -201,7 +209,10 @@ def solve_plan(chosen, session, box, store):
     session.write(chosen.output)
     print(f"{chosen.output}.h5: within {face.error:.3f} mm of rest")
     known = [store.load(u) for u in box.points(chosen.samples or default_samples(box))]
-    if all(known):
+    if not all(known):
+        print(f"{len(known) - known.count(None)} of the map's {len(known)} plans are solved, so how far it is off "
+              "is not known; make the page first, with the same -samples, -accuracy and -cache")
+    else:
         plan_map = PlanMap(box, known, least_bound=chosen.accuracy)
         off = np.linalg.norm(plan_map.displacement(plan) - face.displacement, axis=1)
         print(f"the map is off by {np.percentile(off, 95):.3f} mm on 95 % of the skin, at most by "
@@ -236,10 +247,11 @@ def main():
         with repose.Session(chosen.scene) as session:
             box = PlanBox([piece.name for piece in session.pieces], session.box)
             if not box.coordinates:
-                refuse(f"{chosen.scene}: plan.box: all numbers are 0, so there is no other plan to map; make one larger")
+                refuse(f"{chosen.scene}: plan.box: all numbers are 0, so there is no other plan to map; make "
+                       "one larger")
             key = f"{repose.Scene(chosen.scene).fingerprint(repose.session.find_program())}_{chosen.accuracy:g}"
             store = SampleStore(chosen.cache, key)
-            (solve_plan if chosen.plan else make_page)(chosen, session, box, store)
+            (make_page if chosen.plan is None else solve_plan)(chosen, session, box, store)
     except KeyboardInterrupt:
         refuse("ended; the plans solved so far are kept, and the same command goes on")
     except ValueError as reason:

@@ -101,6 +101,8 @@ def test_the_plan_shown_is_solved_by_its_command(made, script):
                     solved.stdout)
     assert float(off[1]) < 0.1 and int(off[3]) > 80, solved.stdout
     assert scene.with_name("plan.h5").is_file() and f"{scene.with_name('plan.h5')}: within" in solved.stdout
+    unknown = script(scene, "-accuracy", 0.06, "-samples", SAMPLES, "-plan", "{}")
+    assert unknown.returncode == 0 and "0 of the map's 9 plans are solved" in unknown.stdout, unknown
 
 
 @pytest.mark.parametrize("arguments, words", [
@@ -108,6 +110,8 @@ def test_the_plan_shown_is_solved_by_its_command(made, script):
     (["-plan", '{"jaw": {}}'], "'jaw' is no piece of the plan; its pieces are mandible"),
     (["-plan", '{"mandible": 3}'], "give {PIECE:"), (["-plan", "{"], "not JSON"),
     (["-plan", "[" * 10000], "not JSON"),
+    (["-plan", ""], "not JSON"), (["-plan", '{"mandible": {"translate": [true, 0, 0]}}'], "give {PIECE:"),
+    (["-plan", '{"mandible": {}, "mandible": {}}'], "'mandible' is given more than once"),
     (["-samples", 1], "-samples: 1: must be a whole number from 3 to 10000"),
     (["-accuracy", "0,01"], "-accuracy: 0,01: must be a number from 0.0001 to 1"),
     (["-cache", __file__], f"-cache {__file__}: {__file__} is no folder; choose another one"),
