@@ -1,5 +1,7 @@
 #include "repose/model/instruments.h"
 
+#include <fmt/format.h>
+
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
@@ -84,7 +86,7 @@ std::optional<Stretch> line_and(const scene::HalfSpace& half, const Vec3& p, con
 surface::Surface read_body(const scene::ClosedMesh& mesh) {
   surface::Surface body = surface::weld_and_orient(surface::read_surface(mesh.file));
   if (const surface::Defects d = surface::inspect(body, false); !d.outward)
-    base::refuse("{}: an instrument must be a closed surface; it has {}", mesh.file.string(),
+    base::refuse("{}: an instrument must be a closed surface; it is {}", mesh.file.string(),
                  surface::describe(d));
   return body;
 }
@@ -127,6 +129,19 @@ std::optional<Stretch> PushedShape::along(const Vec3& p) const {
 
 namespace {
 
+/// Hint at the unit of a mesh that is too small or too large for an instrument in mm; else empty.
+std::string hint_at_unit(const scene::Instrument& instrument) {
+  constexpr double smallest = 3, largest = 1000;  // mm
+  const auto* mesh = std::get_if<scene::ClosedMesh>(&instrument.shape);
+  if (mesh == nullptr) return "";
+  Eigen::AlignedBox3d box;
+  for (const Vec3& point : read_body(*mesh).points) box.extend(point);
+  const double across = box.diagonal().norm();
+  if (across >= smallest && across <= largest) return "";
+  return fmt::format("; {} is {:.3g} mm across and seems not to be in mm: scale it",
+                     mesh->file.string(), across);
+}
+
 /// Refuses an instrument that reaches no column that is still free; one to which the skin sticks
 /// holds those it reaches.
 void meet(const scene::Instrument& instrument, int32_t number, const std::vector<Vec3>& skin,
@@ -152,7 +167,8 @@ void meet(const scene::Instrument& instrument, int32_t number, const std::vector
   if (holder >= 0)
     base::refuse("all points of the skin that it reaches are held by instruments[{}]; move it",
                  holder);
-  base::refuse("it reaches no free point of the skin; move it or push it farther");
+  base::refuse("it reaches no free point of the skin; move it or push it farther{}",
+               hint_at_unit(instrument));
 }
 
 }  // namespace

@@ -47,7 +47,7 @@ Contains inside(const scene::ClosedMesh& mesh, double near) {
   const surface::Surface read = surface::read_surface(mesh.file);
   const surface::Defects defects = surface::inspect(read, false);
   if (defects.border_edges > 0 || defects.non_manifold_edges > 0)
-    base::refuse("{}: a region is the inside of a closed mesh; this one has {}", mesh.file.string(),
+    base::refuse("{}: a region is the inside of a closed mesh; this one is {}", mesh.file.string(),
                  surface::describe(defects));
   const auto tree = std::make_shared<surface::DistanceTree>(read);
   return [tree, near](const Vec3& x) {

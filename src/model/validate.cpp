@@ -289,7 +289,7 @@ void require_closed(const std::string& name, const surface::Surface& mesh,
   if (mesh.triangles.empty())
     check.refuse(name, "has no triangles; tissue can only touch a closed surface");
   if (const surface::Defects defects = surface::inspect(mesh, false); !defects.outward)
-    check.refuse(name, "must be a closed surface that faces outward; it has {}",
+    check.refuse(name, "must be a closed surface that faces outward; it is {}",
                  surface::describe(defects));
 }
 

@@ -146,7 +146,8 @@ BAD = {
                    ["instruments[0].box.size", "greater than 0"]),
     "a half-space pulled": (SHAPE, "half_space: {point: [60, -90, 0], normal: [6, -8, 0]}",
                             ["instruments[0]", "side of its normal"]),
-    "an open mesh": (SHAPE, "mesh: paper_skin.ply", ["paper_skin.ply", "closed"]),
+    "an open mesh": (SHAPE, "mesh: paper_skin.ply", ["paper_skin.ply", "a closed surface; it is open, "]),
+    "meters": (SHAPE, "mesh: rod.ply", ["instruments[0]", "rod.ply is 0.0346 mm across and seems not to be in mm"]),
 }
 
 
@@ -155,6 +156,8 @@ def test_bad_instruments_are_refused_in_one_line(run, folder, case):
     old, new, words = BAD[case]
     assert old in SCENE
     (folder / "press.yaml").write_text(SCENE.replace(old, new))
+    write(folder / "rod.ply", box((0.05, -0.1, -0.02), (0.07, -0.08, 0.0)).reshape(-1, 3),
+          np.arange(36, dtype=np.int32).reshape(-1, 3))
     before = sorted(folder.iterdir())
     result = run("repose-solve", "press.yaml", cwd=folder)
     assert result.returncode == 1, result
