@@ -79,13 +79,25 @@ std::string grid(const XdmfBlock& block, const std::string& h5, size_t step, dou
   return text + "      </Grid>\n";
 }
 
-/// A document of a collection of grids over time.
-std::string temporal(const std::string& name, const std::string& grids) {
+/// A grid that holds others: `kind` is Temporal or Spatial.
+std::string collection(const std::string& name, const char* kind, const std::string& grids) {
   return fmt::format(
-      "<?xml version=\"1.0\"?>\n<Xdmf Version=\"3.0\">\n  <Domain>\n"
-      "    <Grid Name=\"{}\" GridType=\"Collection\" CollectionType=\"Temporal\">\n{}"
-      "    </Grid>\n  </Domain>\n</Xdmf>\n",
-      name, grids);
+      "    <Grid Name=\"{}\" GridType=\"Collection\" CollectionType=\"{}\">\n{}    </Grid>\n",
+      escaped(name), kind, grids);
+}
+
+/// The load steps of a block.
+std::string over_time(const XdmfBlock& block, const std::string& h5,
+                      const std::vector<double>& loads) {
+  std::string text;
+  for (size_t step = 0; step < loads.size(); ++step) text += grid(block, h5, step, loads[step]);
+  return collection(block.name, "Temporal", text);
+}
+
+std::string document(const std::string& content) {
+  return fmt::format(
+      "<?xml version=\"1.0\"?>\n<Xdmf Version=\"3.0\">\n  <Domain>\n{}  </Domain>\n</Xdmf>\n",
+      content);
 }
 
 }  // namespace
@@ -96,21 +108,14 @@ std::string XdmfArray::in_step(size_t step) const {
 
 std::string xdmf_document(const XdmfBlock& block, const std::string& h5,
                           const std::vector<double>& loads) {
-  std::string text;
-  for (size_t step = 0; step < loads.size(); ++step) text += grid(block, h5, step, loads[step]);
-  return temporal(block.name, text);
+  return document(over_time(block, h5, loads));
 }
 
 std::string xdmf_document(const std::vector<XdmfBlock>& blocks, const std::string& h5,
                           const std::vector<double>& loads) {
   std::string text;
-  for (size_t step = 0; step < loads.size(); ++step) {
-    text += "      <Grid Name=\"blocks\" GridType=\"Collection\" CollectionType=\"Spatial\">\n";
-    text += fmt::format("        <Time Value=\"{}\"/>\n", loads[step]);
-    for (const XdmfBlock& block : blocks) text += grid(block, h5, step, loads[step]);
-    text += "      </Grid>\n";
-  }
-  return temporal("blocks", text);
+  for (const XdmfBlock& block : blocks) text += over_time(block, h5, loads);
+  return document(collection("blocks", "Spatial", text));
 }
 
 }  // namespace repose::results

@@ -46,7 +46,8 @@ struct XdmfBlock {
 std::string xdmf_document(const XdmfBlock& block, const std::string& h5,
                           const std::vector<double>& loads);
 
-/// The XDMF document of several blocks by name: a temporal collection of spatial ones.
+/// The XDMF document of several blocks by name: a spatial collection of temporal ones. VTK numbers
+/// the second and later grids of a name, but names a block by its collection.
 std::string xdmf_document(const std::vector<XdmfBlock>& blocks, const std::string& h5,
                           const std::vector<double>& loads);
 

@@ -324,14 +324,14 @@ def rows_of(item, h5):
 @pytest.mark.quick
 def test_blocks_are_named_and_each_bone_is_one(face):
     root = xml.etree.ElementTree.parse(face.with_name(f"{face.stem}_blocks.xdmf")).getroot()
-    collections = root.findall("Domain/Grid/Grid")
+    collections = {grid.get("Name"): grid for grid in root.findall("Domain/Grid/Grid")}
     with h5py.File(face) as h5:
         bones = [name.decode() for name in h5["model/bone"]]
-        assert len(collections) == len(h5["step"])
-        for collection, step in zip(collections, h5["step"].values()):
-            assert float(collection.find("Time").get("Value")) == step.attrs["load"]
-            grids = {grid.get("Name"): grid for grid in collection.findall("Grid")}
-            assert list(grids) == ["tissue", "springs", "skin", *bones]
+        assert list(collections) == ["tissue", "springs", "skin", *bones], "one of each name, as VTK shows it"
+        assert {len(collection.findall("Grid")) for collection in collections.values()} == {len(h5["step"])}
+        for row, step in enumerate(h5["step"].values()):
+            grids = {name: collection.findall("Grid")[row] for name, collection in collections.items()}
+            assert {float(grid.find("Time").get("Value")) for grid in grids.values()} == {step.attrs["load"]}
             moved = step.get("bone_surface/points", h5["model/bone_surfaces/points"])[:]
             bone = np.zeros(len(moved), int)
             bone[h5["model/bone_surfaces/triangles"][:]] = h5["model/bone_surfaces/bone"][:][:, None]
