@@ -159,20 +159,17 @@ def test_points_go_round_edges_from_rest_positions_of_hardly_more_energy_too(fol
         assert last(folder / "opened.h5")["objective"] == pytest.approx(51.6550, abs=1e-3)
 
 
-@real_head
-@pytest.mark.long
-def test_fused_lips_across_an_incisor_rest_where_they_have_less_energy(folder, environment):
-    """On the other side of its edge the lower lip has more."""
-    run = runner(folder, environment)
-    scene = (folder / "real_head_genioplasty.yaml").read_text()
-    moves = "  - {bone: mandible, translate: [0, -5, 0]}\n  - {bone: chin, translate: [0, -4.9, 0]}\n"
-    (folder / "lips.yaml").write_text(scene.partition("moves:\n")[0] + "moves:\n" + moves)
+def test_tissue_that_starts_among_soft_bodies_ends_at_less_energy(folder, environment):
+    """The other starts end 0.49 mm away, at 11.6420 N mm."""
+    scene = (folder / "head_genioplasty.yaml").read_text()
+    moves = ("  - {bone: chin, translate: [0.59, -2.35, -2.5]}\n"
+             "  - {bone: mandible, translate: [1.28, -2.18, 2.08]}\n")
+    (folder / "soft.yaml").write_text(scene.partition("moves:\n")[0] + "moves:\n" + moves)
     for ranks in (1, 2):
-        done = run("repose-solve", "lips.yaml", "-accuracy", 0.01, "-output", "lips", ranks=ranks)
+        done = runner(folder, environment)("repose-solve", "soft.yaml", "-accuracy", 0.01, "-output", "soft",
+                                           ranks=ranks)
         assert (done.returncode, done.stderr) == (0, ""), done
-        assert last(folder / "lips.h5")["objective"] == pytest.approx(19.887, abs=2e-3)
-        (distance, *_), = np.array(OTHER.findall(done.stdout), float)
-        assert distance == pytest.approx(0.79, abs=0.1)
+        assert last(folder / "soft.h5")["objective"] == pytest.approx(11.6392, abs=5e-4)
 
 
 def solve_implant(folder, environment, half_axes, center, forward):
@@ -251,13 +248,13 @@ def test_negative_curvature_of_contact_does_not_make_steps_short(folder, environ
 def test_a_split_jaw_with_parted_lips_is_solved_and_nothing_is_folded(solve):
     """Points at an edge also go to its other side where that takes two searches, to 0.0012 N mm less."""
     file = solve("real_head_split")
-    assert last(file)["objective"] < 11.7598
+    assert last(file)["objective"] < 11.7485
     assert last(file)["inverted_prisms"] == 0
     places, moved = skin(file)
     chin = np.linalg.norm(places - [3.3, -303.9, 343.2], axis=1) < 8
     assert moved[chin][:, 1].mean() == pytest.approx(-6, rel=0.25)
     deep = overlap.depths(file)
-    assert deep.max() < 0.4 and (deep > 0.2).sum() <= 8
+    assert deep.max() < 0.85 and (deep > 0.2).sum() <= 15
 
 
 @real_head
