@@ -120,6 +120,35 @@ TEST(Restart, OfAModelThatDiffersKeepsNothing) {
   }
 }
 
+/// Returns small_model() with a cut of 2 × 2 controls a side.
+model::Model cut_model() {
+  model::Model m = small_model();
+  m.contact.stiffness = 0.1;
+  m.contact.cut_faces = {{{2, 2}}, {0}, {}, std::vector<double>(8, 1.0), {0, 1, 0, 0}};
+  for (int64_t c = 0; c < 8; ++c) {
+    m.contact.cut_faces.point.push_back(c % static_cast<int64_t>(m.points.position.size()));
+    m.contact.cut_faces.begin.push_back(c + 1);
+  }
+  return m;
+}
+
+TEST(Restart, OfOtherSidesOfCutsKeepsNothing) {
+  const std::vector<std::pair<std::string, std::function<void(model::CutFaces&)>>> changes = {
+      {"contact/point", [](model::CutFaces& faces) { faces = {}; }},
+      {"contact/wall/point",
+       [](model::CutFaces& faces) { std::swap(faces.point[0], faces.point[1]); }},
+      {"contact/wall/area", [](model::CutFaces& faces) { faces.area[0] = 2; }}};
+  for (const auto& [array, change] : changes) {
+    const Folder folder;
+    write_small_result(folder.path("a"), cut_model());
+    model::Model m = cut_model();
+    change(m.contact.cut_faces);
+    const Restart restart = read_restart(MPI_COMM_SELF, folder.path("a.h5"), m);
+    EXPECT_EQ(restart.differing, array);
+    EXPECT_FALSE(restart.end);
+  }
+}
+
 TEST(Restart, IsFromTheRestPositionAtWhichASignalEndedTheRun) {
   const Folder folder;
   const model::Model m = small_model();
