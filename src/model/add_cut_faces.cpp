@@ -33,14 +33,12 @@ class CutFaceBuilder {
   }
 
   /// Keeps one side off the other, and the other's edges off the one: an edge would pass between
-  /// places of a side. These meet a rounder surface, so that they touch none where sides lie on
-  /// each other: the same edge kept off twice makes searches long.
+  /// places of a side.
   void build(CutFaces& cut_faces) const {
     if (cut_faces.begin.empty()) cut_faces.begin.push_back(0);
     const bool left = faces_away();
-    constexpr double sharp = 0.2, round = 1;
-    add_nets(left, false, sharp, cut_faces);
-    add_nets(!left, true, round, cut_faces);
+    add_nets(left, false, cut_faces);
+    add_nets(!left, true, cut_faces);
   }
 
  private:
@@ -48,10 +46,9 @@ class CutFaceBuilder {
   using Shares = std::vector<std::pair<int64_t, double>>;
 
   /// Adds the net of a side that is kept off, with its edges alone or with all its places, and that
-  /// of the surface, whose first row round an edge lies `nearest` edges of the skin from it. Seen
-  /// from the other side columns are in reverse order, so that normals, along × inwards, point out
-  /// of the surface.
-  void add_nets(bool kept_off, bool edges_alone, double nearest, CutFaces& cut_faces) const {
+  /// of the surface. Seen from the other side columns are in reverse order, so that normals, along
+  /// × inwards, point out of the surface.
+  void add_nets(bool kept_off, bool edges_alone, CutFaces& cut_faces) const {
     const auto columns = static_cast<int64_t>(cut_.columns.size());
     const int64_t rows = deepest_ + 1 + beyond + (through_ ? beyond : 0);
     const auto column = [&](int64_t c) { return edges_alone ? columns - 1 - c / rows : c / rows; };
@@ -59,7 +56,7 @@ class CutFaceBuilder {
     cut_faces.size.push_back({columns, rows});
     for (const bool left : {kept_off, !kept_off})
       for (int64_t c = 0; c < columns * rows; ++c) {
-        for (const auto& [point, weight] : control(column(c), layer(c), left, nearest)) {
+        for (const auto& [point, weight] : control(column(c), layer(c), left)) {
           cut_faces.point.push_back(point);
           cut_faces.weight.push_back(weight);
         }
@@ -92,7 +89,7 @@ class CutFaceBuilder {
   }
 
   /// Layers −1 and −2, and as many beyond the deepest, lie round the edge, on the skin or inside.
-  Shares control(size_t i, int layer, bool left, double nearest) const {
+  Shares control(size_t i, int layer, bool left) const {
     constexpr double step = 0.75;  // edges of the skin
     const int inner = std::clamp(layer, 0, deepest_);
     Shares shares = {{side_of(node(cut_.columns[i], inner), left), 1.0}};
@@ -100,7 +97,7 @@ class CutFaceBuilder {
     const Shares direction = shares_around(i, inner, left);
     Vec3 length = Vec3::Zero();
     for (const auto& [point, weight] : direction) length += weight * position(point);
-    const double distance = (nearest + (std::abs(layer - inner) - 1) * step) * cut_.edge;
+    const double distance = std::abs(layer - inner) * step * cut_.edge;
     for (const auto& [point, weight] : direction)
       shares.emplace_back(point, distance / length.norm() * weight);
     return shares;
