@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from conftest import PROJECT, programs
-from tissue import apart, last, model_of, steps
+from tissue import apart, last, steps
 
 SCENE = PROJECT / "meshes/paper_jaw_advance.yaml"
 VIEWS = ["bones", "skin", "springs", "tissue"]

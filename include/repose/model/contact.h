@@ -38,13 +38,13 @@ struct ContactPairs {
   std::vector<double> offset = {};
 };
 
-/// The two sides of cuts, which do not pass one another: of each cut two nets of controls of smooth
-/// surfaces (docs/theory/contact.md), one of the first side, whose places stay off the second's
-/// surface. A net has columns along the cut and rows from the skin inwards; a control is a weighted
-/// sum of points.
+/// The two sides of cuts, which do not pass one another: pairs of nets of controls of smooth
+/// surfaces (docs/theory/contact.md), of a first side, whose places stay off the second's surface.
+/// A cut has two pairs, the other way round in the second. A net has columns along the cut and rows
+/// from the skin inwards; a control is a weighted sum of points.
 struct CutFaces {
-  std::vector<std::array<int64_t, 2>> size;  ///< [K] columns and rows of a cut's nets
-  /// [controls + 1] where a control's points begin: of each cut those of the first side, column by
+  std::vector<std::array<int64_t, 2>> size;  ///< [K] columns and rows of a pair's nets
+  /// [controls + 1] where a control's points begin: of each pair those of the first side, column by
   /// column, then those of the second.
   std::vector<int64_t> begin;
   std::vector<int64_t> point;  ///< rows of points; of a place that touches, first one nearest to it
