@@ -105,8 +105,8 @@ struct Region {
   bool operator<(const Region& other) const { return bound < other.bound; }
 };
 
-/// Branch and bound: a distance changes by no more than the way. A plate needs many regions to
-/// prove that it is nowhere deeper, but few to find its depth, so that `most` of them are enough.
+/// Branch and bound: a distance changes by no more than the way. Ends after `most` regions: few
+/// find the depth of a plate, and only the proof that it is nowhere deeper takes more.
 double deepest_in(const surface::DistanceField& field, double at_most) {
   constexpr int most = 1 << 16;
   constexpr double near = 1.02;  // times the depth

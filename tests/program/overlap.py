@@ -1,4 +1,5 @@
-"""How deep points at a cut lie in the tissue of its other side, from prisms and their places alone."""
+"""How deep points at a scene's first cut lie in the tissue of its other side: depths from prisms and their
+places alone, the points of each side from the nets of the file."""
 
 import numpy as np
 from scipy.sparse import coo_matrix
