@@ -28,11 +28,6 @@ std::vector<Vec3> between(const surface::Corners& corner, int parts) {
   return at;
 }
 
-double longest_edge(const surface::Corners& corner) {
-  const auto& [a, b, c] = corner;
-  return std::max({(a - b).norm(), (b - c).norm(), (c - a).norm()});
-}
-
 struct Through {
   int64_t triangles = 0;
   double depth = 0;  // mm
@@ -49,7 +44,7 @@ Through pass_through(const surface::Surface& initial, const surface::Surface& no
   int64_t hint = -1;
   for (const Triangle& triangle : now.triangles) {
     const surface::Corners corner = surface::corners(now, triangle);
-    const double longest = longest_edge(corner);
+    const double longest = surface::longest_side(corner);
     hint = near.any_within(corner[0], longest * longest, hint);
     if (hint < 0) continue;
     if (!depth) depth.emplace(bone);
