@@ -35,6 +35,31 @@ mechanics::BodyContact rounded_bodies(MPI_Comm comm, const Part& part) {
   return {pairs, part.model.contact.stiffness, std::move(bodies)};
 }
 
+/// Returns the nets of cuts' sides with rounder edges: of two controls that go round an edge, which
+/// are sums of several points, the first lies halfway to the second.
+model::CutFaces rounded_cut_faces(const model::CutFaces& sharp) {
+  model::CutFaces rounded = sharp;
+  rounded.begin.assign(sharp.empty() ? 0 : 1, 0), rounded.point.clear(), rounded.weight.clear();
+  const auto several = [&](size_t c) { return sharp.begin[c + 1] > sharp.begin[c] + 1; };
+  const auto add = [&](size_t c, double share) {
+    for (auto k = sharp.begin[c]; k < sharp.begin[c + 1]; ++k) {
+      rounded.point.push_back(sharp.point[k]);
+      rounded.weight.push_back(share * sharp.weight[k]);
+    }
+  };
+  size_t c = 0;
+  for (const auto& [columns, rows] : sharp.size)
+    for (int64_t k = 0; k < 2 * columns * rows; ++k, ++c) {
+      const bool first = k % rows == 1 && several(c - 1);
+      const bool last = k % rows == rows - 2 && several(c + 1);
+      const bool between = several(c) && (first || last);
+      add(between ? c - 1 : c, between ? 0.5 : 1);
+      if (between) add(c + 1, 0.5);
+      rounded.begin.push_back(static_cast<int64_t>(rounded.point.size()));
+    }
+  return rounded;
+}
+
 }  // namespace
 
 Contact::Contact(const Positions& positions)
@@ -43,14 +68,19 @@ Contact::Contact(const Positions& positions)
               positions.part().bodies),
       other_bodies_(rounded_bodies(positions.comm(), positions.part())),
       cut_faces_(positions.part().model.contact.cut_faces,
-                 positions.part().model.contact.stiffness) {}
+                 positions.part().model.contact.stiffness),
+      other_cut_faces_(rounded_cut_faces(positions.part().model.contact.cut_faces),
+                       positions.part().model.contact.stiffness) {}
 
-void Contact::round_bodies(bool rounded) {
+void Contact::round_edges(bool rounded) {
   if (rounded == rounded_) return;
   rounded_ = rounded;
   other_bodies_.set_multipliers(bodies_.multipliers());
   other_bodies_.set_stiffness(bodies_.stiffness());
   std::swap(bodies_, other_bodies_);
+  other_cut_faces_.set_multipliers(cut_faces_.multipliers());
+  other_cut_faces_.set_stiffness(bodies_.stiffness());
+  std::swap(cut_faces_, other_cut_faces_);
   placed_at_ = -1;
 }
 
@@ -94,7 +124,7 @@ void Contact::place_bodies() {
 
 void Contact::reset() {
   const double stiffness = positions_.part().model.contact.stiffness;
-  round_bodies(false);
+  round_edges(false);
   bodies_.reset(stiffness);
   other_bodies_.reset(stiffness);
   set_multipliers({});

@@ -89,15 +89,17 @@ class CutFaceBuilder {
   }
 
   /// Layers −1 and −2, and as many beyond the deepest, lie round the edge, on the skin or inside.
+  /// The spline rounds an edge by a sixth of the way to the first of them.
   Shares control(size_t i, int layer, bool left) const {
-    constexpr double step = 0.75;  // edges of the skin
+    constexpr double first = 0.2, second = 1.5, max_first = 1.2;  // edges of the skin; mm
     const int inner = std::clamp(layer, 0, deepest_);
     Shares shares = {{side_of(node(cut_.columns[i], inner), left), 1.0}};
     if (layer == inner) return shares;
     const Shares direction = shares_around(i, inner, left);
     Vec3 length = Vec3::Zero();
     for (const auto& [point, weight] : direction) length += weight * position(point);
-    const double distance = std::abs(layer - inner) * step * cut_.edge;
+    const double distance =
+        std::abs(layer - inner) == 1 ? std::min(first * cut_.edge, max_first) : second * cut_.edge;
     for (const auto& [point, weight] : direction)
       shares.emplace_back(point, distance / length.norm() * weight);
     return shares;

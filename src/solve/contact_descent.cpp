@@ -57,13 +57,13 @@ void ContactDescent::slacken(Vec displacement) {
 ContactDescent::End ContactDescent::approach(Vec displacement, double accuracy,
                                              int64_t& iterations) {
   constexpr double roughly = 0.1, finely = 0.004;  // mm
-  objective_.contact().round_bodies(true);
+  objective_.contact().round_edges(true);
   soften();
   const Outcome near = minimizer_.presolve(displacement, std::max(roughly, accuracy));
   harden(displacement);
   iterations += near.iterations;
   const End end = near.stopped ? End::stopped : programs_.run(displacement, finely, iterations);
-  objective_.contact().round_bodies(false);
+  objective_.contact().round_edges(false);
   tangent_.forget_contact();
   return end;
 }

@@ -33,7 +33,7 @@ bool ContactPrograms::predict(Vec displacement, double load, Vec increment) {
   positions.update(displacement);
   objective_.contact().place_bodies();
   const std::vector<Vec3> travel = positions.travel_to(load);
-  objective_.contact().round_bodies(true);
+  objective_.contact().round_edges(true);
   check(VecSet(gradient_, 0));  // it is at rest
   subtract_contact();
   qp_.gaps().linearize(displacement, load, travel);

@@ -24,7 +24,7 @@ std::optional<bool> ContactSearch::predict(Vec displacement, double load, Vec in
   const bool found = programs_.predict(displacement, load, increment);
   tangent_.forget_contact();
   if (!found) {
-    objective_.contact().round_bodies(false);
+    objective_.contact().round_edges(false);
     penalty_.set_multipliers(before);
   }
   return found;

@@ -19,9 +19,9 @@ class Contact {
 
   mechanics::BodyContact& bodies() { return bodies_; }
   mechanics::CutFaceContact& cut_faces() { return cut_faces_; }
-  /// Rounds the edges of bodies whose distances are read from grids, or no more. The multipliers
-  /// are kept.
-  void round_bodies(bool rounded);
+  /// Rounds the edges of cuts, and of bodies whose distances are read from grids, or no more. The
+  /// multipliers are kept.
+  void round_edges(bool rounded);
   double stiffness() const { return bodies_.stiffness(); }  ///< N/mm³
   void set_stiffness(double stiffness);
   ContactPressures multipliers() const;
@@ -50,9 +50,9 @@ class Contact {
  private:
   const Positions& positions_;
   mechanics::BodyContact bodies_, other_bodies_;  // those in use, and the others
-  bool rounded_ = false;                          // bodies in use are
-  int64_t placed_at_ = -1;                        // positions' revision at which they are
-  mechanics::CutFaceContact cut_faces_;
+  mechanics::CutFaceContact cut_faces_, other_cut_faces_;
+  bool rounded_ = false;    // those in use are
+  int64_t placed_at_ = -1;  // positions' revision at which bodies are
 };
 
 }  // namespace repose::discrete

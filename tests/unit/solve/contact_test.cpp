@@ -307,8 +307,7 @@ model::Model cut_block(bool cut) {
 }
 
 // The triangles beside the cut are no mirror images, so that the whole block carries some shear
-// there, which sides without friction do not, and edges of cuts are rounded by an eighth of the
-// mesh's, 5 mm.
+// there, which sides without friction do not, and edges of cuts are rounded by 0.17 mm.
 TEST(Contact, TheSidesOfACutThatIsPressedTogetherCarryWhatTheWholeBlockCarries) {
   model::Model whole = cut_block(false), parted = cut_block(true);
   const auto press = [](const Vec3& x) -> Vec3 { return {x.x(), 0.95 * x.y() + 1, x.z()}; };
@@ -319,7 +318,8 @@ TEST(Contact, TheSidesOfACutThatIsPressedTogetherCarryWhatTheWholeBlockCarries) 
   EXPECT_TRUE(two.summary.path.complete()) << two.summary.last.reason;
   for (size_t i = 0; i < whole.points.position.size(); ++i) {
     const bool edge = whole.points.layer[i] == 0 && whole.points.position[i].y() == 20;
-    EXPECT_LE((one.rows.position[i] - two.rows.position[i]).norm(), edge ? 0.25 : 0.07);  // of 1 mm
+    EXPECT_LE((one.rows.position[i] - two.rows.position[i]).norm(),
+              edge ? 0.21 : 0.065);  // of 1 mm
   }
   EXPECT_LE(two.summary.last.penetration, 1e-3);
   const std::vector<double>& force = field(two, "contact_force");
