@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <tuple>
 
 namespace repose::mechanics {
 
@@ -43,17 +44,21 @@ SplineWeights spline_weights(double at, int controls) {
   return weights;
 }
 
-CutFaceContact::Patch::Patch(const Net& net, const std::vector<Vec3>& controls,
-                             const Eigen::Vector2d& at)
+CutFaceContact::Patch::Patch(const Net& net, const Eigen::Vector2d& at)
     : rows(net.rows),
       along(spline_weights(at[0], net.columns)),
-      inwards(spline_weights(at[1], net.rows)),
-      point(sum(controls, 0, 0)),
-      first(sum(controls, 1, 0)),
-      second(sum(controls, 0, 1)),
-      first_first(sum(controls, 2, 0)),
-      first_second(sum(controls, 1, 1)),
-      second_second(sum(controls, 0, 2)) {}
+      inwards(spline_weights(at[1], net.rows)) {}
+
+CutFaceContact::Patch::Patch(const Net& net, const std::vector<Vec3>& controls,
+                             const Eigen::Vector2d& at)
+    : Patch(net, at) {
+  point = sum(controls, 0, 0);
+  first = sum(controls, 1, 0);
+  second = sum(controls, 0, 1);
+  first_first = sum(controls, 2, 0);
+  first_second = sum(controls, 1, 1);
+  second_second = sum(controls, 0, 2);
+}
 
 Vec3 CutFaceContact::Patch::sum(const std::vector<Vec3>& controls, int d_along,
                                 int d_inwards) const {
@@ -112,9 +117,8 @@ void CutFaceContact::add_net(const model::CutFaces& cut_faces, size_t cut, size_
 /// A place of the last net but one, against the last.
 void CutFaceContact::add_place(int64_t point, double area, const Eigen::Vector2d& at) {
   const Net& own = nets_[nets_.size() - 2];
-  const std::vector<Vec3> nowhere(own.controls.size(), Vec3::Zero());
   std::map<int32_t, double> shares;
-  Patch(own, nowhere, at).for_each(0, 0, [&](int control, double weight) {
+  Patch(own, at).for_each(0, 0, [&](int control, double weight) {
     if (weight != 0)
       for (const auto& [p, share] : own.controls[control]) shares[p] += weight * share;
   });
@@ -198,6 +202,22 @@ auto nearest_place(Eigen::Vector2d where, const Eigen::Vector2d& maximum, const 
   return std::pair(patch, (where - minimum).minCoeff() > 0 && (maximum - where).minCoeff() > 0);
 }
 
+/// Returns the nearest of the places that nearest_place() finds from `starts`. On a surface bent
+/// round an edge these may be different ones.
+template <class Patch, class Evaluate>
+std::pair<Patch, bool> nearest_foot(const std::vector<Eigen::Vector2d>& starts,
+                                    const Eigen::Vector2d& maximum, const Vec3& at,
+                                    Evaluate&& evaluate) {
+  std::pair<Patch, bool> nearest;
+  double distance = std::numeric_limits<double>::infinity();
+  for (const Eigen::Vector2d& start : starts) {
+    auto found = nearest_place(start, maximum, at, evaluate);
+    const double there = (at - found.first.point).norm();
+    if (there < distance) std::tie(nearest, distance) = std::pair(std::move(found), there);
+  }
+  return nearest;
+}
+
 }  // namespace
 
 std::vector<CutFaceContact::Touched> CutFaceContact::touched(size_t w) const {
@@ -222,32 +242,54 @@ std::vector<CutFaceContact::Touched> CutFaceContact::touched(size_t w) const {
   return {touched.begin(), touched.end()};
 }
 
+CutFaceContact::Samples::Samples(const Net& net, const std::vector<Vec3>& controls) {
+  for (double i = -1; i <= net.columns; i += step)
+    for (double j = -1; j <= net.rows; j += step)
+      point.push_back(Patch(net, {i, j}).sum(controls, 0, 0));
+  rows = static_cast<int>((net.rows + 1) / step) + 1;
+  columns = static_cast<int>(point.size()) / rows;
+}
+
+std::vector<Eigen::Vector2d> CutFaceContact::Samples::near(const Vec3& at) const {
+  constexpr double times = 2;  // the least distance
+  std::vector<double> square;
+  for (const Vec3& p : point) square.push_back((p - at).squaredNorm());
+  const double largest = times * times * *std::ranges::min_element(square);
+  const auto is_least = [&](int sample) {
+    const int i = sample / rows, j = sample % rows;
+    for (int k = std::max(0, i - 1); k < std::min(columns, i + 2); ++k)
+      for (int l = std::max(0, j - 1); l < std::min(rows, j + 2); ++l)
+        if (square[k * rows + l] < square[sample]) return false;
+    return true;
+  };
+  std::vector<Eigen::Vector2d> found;
+  for (int sample = 0; sample < columns * rows; ++sample)
+    if (square[sample] <= largest && is_least(sample))
+      found.push_back(step * Eigen::Vector2d(sample / rows, sample % rows) -
+                      Eigen::Vector2d::Ones());
+  return found;
+}
+
 void CutFaceContact::update_gaps(std::span<const Vec3> position) {
   const auto mean = [&](const std::vector<Share>& shares) {
     Vec3 sum = Vec3::Zero();
     for (const auto& [p, share] : shares) sum += share * position[p];
     return sum;
   };
-  std::vector<Vec3> controls, samples;
+  std::vector<Vec3> controls;
+  Samples samples;
   for (size_t w = 0; w < places_.size(); ++w) {
     const Place& place = places_[w];
     const Net& net = nets_[place.net];
-    const auto patch_at = [&](const Eigen::Vector2d& where) { return Patch(net, controls, where); };
     if (w == 0 || places_[w - 1].net != place.net) {
-      controls.clear(), samples.clear();
+      controls.clear();
       for (const auto& shares : net.controls) controls.push_back(mean(shares));
-      for (int i = 0; i < net.columns; ++i)
-        for (int j = 0; j < net.rows; ++j) samples.push_back(patch_at({i, j}).point);
+      samples = Samples(net, controls);
     }
     const Vec3 at = mean(place.shares);
-    const auto nearest =
-        std::min_element(samples.begin(), samples.end(), [&](const Vec3& a, const Vec3& b) {
-          return (a - at).squaredNorm() < (b - at).squaredNorm();
-        });
-    const auto number = static_cast<int>(nearest - samples.begin());
-    const auto [patch, opposite] =
-        nearest_place(Eigen::Vector2d(number / net.rows, number % net.rows),
-                      Eigen::Vector2d(net.columns, net.rows), at, patch_at);
+    const auto [patch, opposite] = nearest_foot<Patch>(
+        samples.near(at), {net.columns, net.rows}, at,
+        [&](const Eigen::Vector2d& where) { return Patch(net, controls, where); });
     const Vec3 across = patch.first.cross(patch.second), offset = at - patch.point;
     Foot& foot = feet_[w];
     foot.patch = patch;

@@ -248,13 +248,13 @@ def test_negative_curvature_of_contact_does_not_make_steps_short(folder, environ
 def test_a_split_jaw_with_parted_lips_is_solved_and_nothing_is_folded(solve):
     """Points at an edge also go to its other side where that takes two searches, to 0.0012 N mm less."""
     file = solve("real_head_split")
-    assert last(file)["objective"] < 11.7154
+    assert last(file)["objective"] < 11.7597
     assert last(file)["inverted_prisms"] == 0
     places, moved = skin(file)
     chin = np.linalg.norm(places - [3.3, -303.9, 343.2], axis=1) < 8
     assert moved[chin][:, 1].mean() == pytest.approx(-6, rel=0.25)
     deep = overlap.depths(file)
-    assert deep.max() < 0.6
+    assert deep.max() < 0.4
 
 
 @real_head

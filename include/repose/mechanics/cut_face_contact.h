@@ -81,6 +81,7 @@ class CutFaceContact {
   /// A net's surface around one place on it, and its derivatives along the cut and inwards.
   struct Patch {
     Patch() = default;
+    Patch(const Net& net, const Eigen::Vector2d& at);  ///< weights alone
     Patch(const Net& net, const std::vector<Vec3>& controls, const Eigen::Vector2d& at);
     /// Calls visit(control, weight) for a derivative of the surface.
     template <class Visit>
@@ -97,6 +98,17 @@ class CutFaceContact {
     int rows = 0;
     SplineWeights along, inwards;
     Vec3 point, first, second, first_first, first_second, second_second;
+  };
+  /// A net's surface at places `step` apart, as far as it goes on beyond its ends.
+  struct Samples {
+    Samples() = default;
+    Samples(const Net& net, const std::vector<Vec3>& controls);
+    /// Returns where samples are nearer to a point than those around, but for far ones.
+    std::vector<Eigen::Vector2d> near(const Vec3& at) const;
+
+    static constexpr double step = 0.5;  // of a patch
+    int columns = 0, rows = 0;
+    std::vector<Vec3> point;
   };
   struct Foot {
     Patch patch;

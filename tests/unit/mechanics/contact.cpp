@@ -265,6 +265,42 @@ TEST(WallDerivatives, AreThoseOfTheValueBeforeAtAndAfterTouch) {
   }
 }
 
+// The surface is a thin lip, bent round its edge at y = 0.
+TEST(CutFaceContact, MeasuresGapsFromTheNearestFootOfASurfaceBentRoundAnEdge) {
+  constexpr int columns = 8, rows = 6;
+  constexpr double y[] = {7, 1, 0, 4, 8, 12}, z[] = {-1, -0.1, 0, 0.6, 1.2, 1.8};
+  const std::vector<Vec3> near = random_points(columns * rows, 1, 5);
+  model::CutFaces sides{{{columns, rows}}, {0}, {}, {}, std::vector<double>(columns * rows, 1)};
+  std::vector<Vec3> position;
+  for (int c = 0; c < 2 * columns * rows; ++c) {
+    const int row = c % rows;
+    sides.point.push_back(c);
+    sides.weight.push_back(1);
+    sides.begin.push_back(c + 1);
+    position.push_back(c < columns * rows ? Vec3(10, 4, 0) + near[c].cwiseProduct(Vec3(8, 8, 1.5))
+                                          : Vec3(3 * (c / rows - columns), y[row], z[row]));
+  }
+  CutFaceContact contact(sides, 1);
+  contact.update_gaps(position);
+  const auto mean = [&](double i, double j, size_t first) {
+    const SplineWeights along = spline_weights(i, columns), inwards = spline_weights(j, rows);
+    Vec3 sum = Vec3::Zero();
+    for (int k = 0; k < along.count; ++k)
+      for (int l = 0; l < inwards.count; ++l)
+        sum += along.of[0][k] * inwards.of[0][l] *
+               position[first + (along.first + k) * rows + inwards.first + l];
+    return sum;
+  };
+  for (int w = 0; w < columns * rows; ++w) {
+    const Vec3 place = mean(w / rows, w % rows, 0);
+    double nearest = std::numeric_limits<double>::infinity();
+    for (double i = -1; i <= columns; i += 0.05)
+      for (double j = -1; j <= rows; j += 0.05)
+        nearest = std::min(nearest, (mean(i, j, columns * rows) - place).norm());
+    EXPECT_LE(std::abs(contact.gap(w)), nearest + 1e-6);
+  }
+}
+
 /// Expects that gaps change along a direction as their gradients say.
 template <class Gaps>
 void expect_linear(const std::vector<Vec3>& position, Gaps&& gaps) {
