@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 
 #include "mean_near_largest.h"
 #include "repose/surface/edges.h"
@@ -11,6 +12,29 @@ namespace repose::anatomy {
 namespace {
 
 constexpr double nothing = std::numeric_limits<double>::infinity();
+
+/// Triangles from the middles of rims to their edges, over holes that are at most as wide as the
+/// limit below. A mouth is wider.
+std::vector<std::array<Vec3, 3>> closings_of_holes(const std::vector<Vec3>& points,
+                                                   const std::vector<Triangle>& triangles) {
+  constexpr double widest = 12;  // mm, diagonal of the box around a rim
+  const surface::EdgeTable edges(triangles);
+  surface::UnionFind rims(static_cast<int64_t>(points.size()));
+  std::vector<surface::HalfEdge> rim_edges;
+  for (int64_t e = 0; e < edges.edges(); ++e) {
+    if (edges[e].size() != 1) continue;
+    rim_edges.push_back(edges[e][0]);
+    rims.unite(edges[e][0].low, edges[e][0].high);
+  }
+  std::map<int64_t, Eigen::AlignedBox3d> boxes;
+  for (const auto& edge : rim_edges)
+    for (const int64_t end : {edge.low, edge.high}) boxes[rims.find(end)].extend(points[end]);
+  std::vector<std::array<Vec3, 3>> closings;
+  for (const auto& edge : rim_edges)
+    if (const auto& box = boxes[rims.find(edge.low)]; box.diagonal().norm() <= widest)
+      closings.push_back({points[edge.low], points[edge.high], box.center()});
+  return closings;
+}
 
 }  // namespace
 
@@ -25,6 +49,8 @@ FrontMap::FrontMap(const surface::Surface& surface, const HeadFrame& frame) {
   rows_ = static_cast<int64_t>(box.sizes().z() / spacing_) + 3;
   depth_.assign(columns_ * rows_, nothing);
   for (const Triangle& t : surface.triangles) draw(base::pick(points, t));
+  for (const std::array<Vec3, 3>& closing : closings_of_holes(points, surface.triangles))
+    draw(closing);
 }
 
 void FrontMap::draw(const std::array<Vec3, 3>& corner) {

@@ -11,7 +11,8 @@ namespace repose::anatomy {
 using ProfilePoint = Eigen::Vector2d;
 
 /// Depth of a surface as seen from in front: for each cell of a grid in the frontal plane of a head
-/// frame the foremost y, mm. Holes and inner walls of a raw surface do not matter.
+/// frame the foremost y, mm. Inner walls of a raw surface do not matter, and holes at most 12 mm
+/// wide are closed, so that nothing is seen through them.
 class FrontMap {
  public:
   /// Covers all of the surface.

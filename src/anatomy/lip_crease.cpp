@@ -134,7 +134,7 @@ std::vector<Vec3> follow_side(const FrontMap& skin, const Vec3& from, double dep
   };
   for (const double x : skin.steps(std::abs(from.x()) + step, last)) {
     const auto place = deepest(skin, side * x, expected(x), climb);
-    if (!place) break;
+    if (!place || place->y > (points.empty() ? from : points.back()).y() + behind) break;
     shallow = place->depth < share * depth ? shallow + step : 0;
     if (!end && shallow > ending) break;
     tilt = 0.9 * tilt + 0.1 * (place->height - z) / step;
@@ -159,11 +159,13 @@ LipCrease follow_gap(const FrontMap& skin, const Gap& first) {
         if (x > middle) break;
         continue;
       }
-      last = *gap;
-      crease.gap = std::max(crease.gap, gap->high - gap->low);
       const double edge = gap->high + skin.spacing();
       const auto lip = skin.depth(side * x, edge);
-      points.emplace_back(side * x, lip ? *lip : *lip_above(skin, side * x, edge), gap->middle());
+      const double y = lip ? *lip : *lip_above(skin, side * x, edge);
+      if (!points.empty() && y > points.back().y() + behind) break;
+      last = *gap;
+      crease.gap = std::max(crease.gap, gap->high - gap->low);
+      points.emplace_back(side * x, y, gap->middle());
     }
     if (points.empty()) continue;
     const auto beside = follow_side(skin, points.back(), usual_depth, side, {});

@@ -172,10 +172,17 @@ void search_soft_chin(const SkinProfile& at_chin, const surface::Surface& skin, 
 }  // namespace
 
 void search_skin(const surface::Surface& skin, Search& search) {
+  constexpr double behind = 15;  // mm, the bone: what is seen through a wide hole
   const FrontMap map(skin, search.frame());
   const ScanEnd end(skin);
+  double back = INFINITY;
+  if (const auto spine = search.find("nasal_spine"), chin = search.find("pogonion_bone");
+      spine && chin)
+    back = std::max(spine->y(), chin->y()) + behind;
   const auto profile_at = [&](double x) {
-    return SkinProfile{x, map.profile(map.low_z(), map.high_z(), skin_midline, x), end};
+    auto points = map.profile(map.low_z(), map.high_z(), skin_midline, x);
+    std::erase_if(points, [&](const ProfilePoint& p) { return p.x() > back; });
+    return SkinProfile{x, std::move(points), end};
   };
   const SkinProfile midline = profile_at(0),
                     at_chin = profile_at(search.find("menton_bone").value_or(Vec3::Zero()).x());

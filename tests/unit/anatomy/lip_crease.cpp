@@ -49,6 +49,23 @@ surface::Surface open_face() {
   return skin;
 }
 
+TEST(LipCrease, AHoleInALipIsClosedAndAnOpenMouthIsNot) {
+  const auto hole_of = [](double half_width) {
+    surface::Surface skin = curved_face(0);
+    std::erase_if(skin.triangles, [&](const Triangle& t) {
+      const Vec3& p = skin.points[t[0]];
+      return std::abs(p.x()) <= half_width && std::abs(p.z() - 4) <= 2;
+    });
+    add(skin, 150, {-40, -40}, {40, 40});
+    return FrontMap(skin, HeadFrame{});
+  };
+  const FrontMap closed = hole_of(3), open = hole_of(15);
+  EXPECT_FALSE(open_mouth(closed, 1));
+  EXPECT_NEAR(*closed.depth(0.2, 4.2), 1, 1);
+  EXPECT_TRUE(open_mouth(open, 1));
+  EXPECT_NEAR(*open.depth(0.2, 4.2), 150, 1e-9);
+}
+
 TEST(LipCrease, OpenLipsAreThoseOfTheGapAndNotWhatIsSeenThroughIt) {
   const FrontMap map(open_face(), HeadFrame{});
   const auto gap = open_mouth(map, 1);

@@ -12,6 +12,7 @@
 #include "repose/anatomy/picture.h"
 #include "repose/scene/landmark_names.h"
 #include "repose/scene/landmarks.h"
+#include "repose/surface/component.h"
 #include "repose/surface/read.h"
 
 namespace repose::anatomy {
@@ -117,14 +118,38 @@ TEST(ProposeLandmarks, DoNotDependOnTheOrderOfVerticesAndTriangles) {
   }
 }
 
+/// Adds a rectangle in the frontal plane.
+void add_wall(surface::Surface& skin, const Vec3& middle, double half_width, double half_height) {
+  const auto corner = [&](double x, double z) {
+    return Vec3(middle + Vec3(x * half_width, 0, z * half_height));
+  };
+  surface::append(
+      {"", {corner(-1, -1), corner(-1, 1), corner(1, -1), corner(1, 1)}, {{0, 1, 2}, {1, 3, 2}}},
+      skin);
+}
+
+TEST(ProposeLandmarks, LieOnTheSkinAroundAHole) {
+  Head head = shipped();
+  add_wall(head.skin, {0, 100, 0}, 60, 120);  // seen through a hole
+  const Landmarks whole = propose(head).found;
+  const auto with_hole = [&](const Vec3& middle, double radius) {
+    Head holed = head;
+    std::erase_if(holed.skin.triangles, [&](const Triangle& t) {
+      return (base::mean(base::pick(head.skin.points, t)) - middle).norm() < radius;
+    });
+    return holed;
+  };
+  for (const char* name : {"pronasale", "upper_lip", "b_soft", "pogonion_soft"}) {
+    const Head holed = with_hole(whole.at(name), 3);
+    ASSERT_LT(holed.skin.triangles.size(), head.skin.triangles.size()) << name;
+    EXPECT_LT((propose(holed).found.at(name) - whole.at(name)).norm(), 1.5) << name;
+  }
+  EXPECT_TRUE(propose(with_hole(whole.at("pogonion_soft"), 20)).missing.contains("pogonion_soft"));
+}
+
 TEST(ProposeLandmarks, UnevenCornersOfTheMouthAreReported) {
   Head head = shipped();
-  const Vec3 middle = propose(head).found.at("stomion");
-  const auto first = static_cast<int64_t>(head.skin.points.size());
-  for (const double x : {8.0, 60.0})
-    for (const double z : {-20.0, 20.0}) head.skin.points.push_back(middle + Vec3(x, -10, z));
-  head.skin.triangles.push_back({first, first + 1, first + 2});
-  head.skin.triangles.push_back({first + 1, first + 3, first + 2});
+  add_wall(head.skin, propose(head).found.at("stomion") + Vec3(34, -10, 0), 26, 20);
   const Proposal covered = propose(head);
   EXPECT_TRUE(std::any_of(covered.remarks.begin(), covered.remarks.end(), [](const auto& line) {
     return line.find("corners of the mouth") != std::string::npos;
@@ -239,20 +264,18 @@ TEST(ProposeLandmarks, RemarksOnRamiThatEndFarBelowTheirCoronoids) {
 }
 
 TEST(ProposeLandmarks, CornersOfTheMouthAreInFrontWhereSkinIsMissing) {
-  Head head = shipped();
-  const Vec3 stomion = propose(head).found.at("stomion");
-  std::erase_if(head.skin.triangles, [&](const Triangle& triangle) {
-    return head.skin.points[triangle[0]].x() < stomion.x() - 7 &&
-           head.skin.points[triangle[0]].y() < stomion.y() + 60;
-  });
-  const auto first = static_cast<int64_t>(head.skin.points.size());  // the neck, behind
-  for (const double x : {-90.0, 0.0})
-    for (const double z : {-60.0, 60.0}) head.skin.points.push_back(stomion + Vec3(x, 150, z));
-  head.skin.triangles.push_back({first, first + 1, first + 2});
-  head.skin.triangles.push_back({first + 1, first + 3, first + 2});
-  const Landmarks found = propose(head).found;
-  ASSERT_TRUE(found.contains("mouth_right"));
-  EXPECT_LT(found.at("mouth_right").y(), stomion.y() + 30);
+  const Vec3 stomion = propose(shipped()).found.at("stomion");
+  for (const double aside : {6.5, 7.0, 8.0}) {
+    Head head = shipped();
+    std::erase_if(head.skin.triangles, [&](const Triangle& triangle) {
+      return head.skin.points[triangle[0]].x() < stomion.x() - aside &&
+             head.skin.points[triangle[0]].y() < stomion.y() + 60;
+    });
+    add_wall(head.skin, stomion + Vec3(-45, 150, 0), 45, 60);  // the neck
+    const Landmarks found = propose(head).found;
+    ASSERT_TRUE(found.contains("mouth_right"));
+    EXPECT_LT(found.at("mouth_right").y(), stomion.y() + 30) << aside;
+  }
 }
 
 TEST(ProposeLandmarks, RemarksOnTrianglesThatPointInwards) {
