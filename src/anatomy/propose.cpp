@@ -8,6 +8,7 @@
 #include "repose/base/error.h"
 #include "repose/surface/component.h"
 #include "repose/surface/edges.h"
+#include "repose/surface/read.h"
 #include "search.h"
 
 namespace repose::anatomy {
@@ -43,6 +44,34 @@ void require_head(const surface::Surface& skin, const surface::Surface& skull,
   if (((jaw - box.min()).array() < -beside).any() || ((box.max() - jaw).array() < -beside).any())
     base::refuse("{}: the mandible {} lies outside of it; give surfaces of one head in one frame",
                  skin.name, mandible.name);
+}
+
+/// Returns a surface without points that coincide and without specks: parts of less than `least` of
+/// the area of the largest one. A tooth that is apart has more.
+surface::Surface without_specks(const surface::Surface& raw, const char* label,
+                                std::vector<std::string>& remarks) {
+  constexpr double least = 0.001, notable = 0.01;  // of the area of the largest part
+  const std::vector<surface::Surface> parts = surface::components(surface::welded(raw));
+  std::vector<double> areas;
+  for (const surface::Surface& part : parts) areas.push_back(surface::area_of(part));
+  const double largest = areas.empty() ? 0 : std::ranges::max(areas);
+  surface::Surface kept{raw.name, {}, {}};
+  double left_out = 0;
+  int count = 0;
+  for (size_t i = 0; i < parts.size(); ++i) {
+    if (areas[i] >= least * largest) {
+      surface::append(parts[i], kept);
+      continue;
+    }
+    left_out += areas[i];
+    ++count;
+  }
+  if (left_out > notable * largest)
+    remarks.push_back(
+        fmt::format("{} small separate parts of {} were left out, with {:.1f} % of the area of the "
+                    "largest part",
+                    count, label, 100 * left_out / largest));
+  return kept;
 }
 
 /// Remarks on a mandible whose triangles point inwards. A head looks alike when left and right are
@@ -92,8 +121,12 @@ void require_lps(const HeadFrame& frame, const std::string& name) {
 
 }  // namespace
 
-Proposal propose_landmarks(const surface::Surface& skin, const surface::Surface& skull,
-                           const surface::Surface& mandible, const Landmarks& given) {
+Proposal propose_landmarks(const surface::Surface& raw_skin, const surface::Surface& raw_skull,
+                           const surface::Surface& raw_mandible, const Landmarks& given) {
+  std::vector<std::string> remarks;
+  const surface::Surface skin = without_specks(raw_skin, "SKIN", remarks),
+                         skull = without_specks(raw_skull, "SKULL", remarks),
+                         mandible = without_specks(raw_mandible, "MANDIBLE", remarks);
   require_head(skin, skull, mandible);
   HeadFrame frame = fit_head_frame(skull, mandible);
   require_lps(frame, mandible.name);
@@ -111,6 +144,7 @@ Proposal propose_landmarks(const surface::Surface& skin, const surface::Surface&
   search_bones(skull, prepared, search);
   search_skin(skin, search);
   remark_mirrored(mandible, search);
+  for (const std::string& remark : remarks) search.remark(remark);
   return search.proposal();
 }
 

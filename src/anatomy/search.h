@@ -64,13 +64,12 @@ class Search {
   std::vector<std::string> remarks_;
 };
 
-/// The mandible, with the vertices that triangles use and where its scan ended.
+/// The mandible, all vertices of which triangles use, with where its scan ended.
 struct Mandible {
   explicit Mandible(const surface::Surface& surface);
 
   const surface::Surface& surface;
-  std::vector<Vec3> points;
-  std::vector<char> at_rim;  ///< [points]
+  std::vector<char> at_rim;  ///< [points of the surface]
   ScanEnd end;
 };
 

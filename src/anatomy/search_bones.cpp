@@ -115,8 +115,8 @@ void search_symphysis(const FrontMap& map, const ScanEnd& end, Search& search) {
 bool is_cut_off(const Mandible& mandible, const Vec3& top) {
   constexpr double beside = 3;  // mm
   if (mandible.end.within(top, condyle_reach)) return true;
-  for (size_t i = 0; i < mandible.points.size(); ++i)
-    if (mandible.at_rim[i] && (mandible.points[i] - top).norm() <= beside) return true;
+  for (size_t i = 0; i < mandible.surface.points.size(); ++i)
+    if (mandible.at_rim[i] && (mandible.surface.points[i] - top).norm() <= beside) return true;
   return false;
 }
 
@@ -134,7 +134,7 @@ void search_ramus(const Mandible& mandible, int side, Search& search) {
   const std::string name = side > 0 ? "left" : "right";
   double front = INFINITY, back = -INFINITY;
   std::vector<Vec3> points, rear_points;
-  for (const Vec3& point : mandible.points) {
+  for (const Vec3& point : mandible.surface.points) {
     const Vec3 p = search.frame().to_frame(point);
     front = std::min(front, p.y());
     back = std::max(back, p.y());
@@ -270,17 +270,11 @@ void search_upper_jaw(const FrontMap& map, Search& search) {
 
 }  // namespace
 
-Mandible::Mandible(const surface::Surface& surface) : surface(surface), end(surface) {
-  std::vector<char> used(surface.points.size());
-  for (const Triangle& triangle : surface.triangles)
-    for (const int64_t corner : triangle) used[corner] = 1;
-  const auto border = surface::border_vertices(surface::EdgeTable(surface.triangles), used.size());
-  for (size_t i = 0; i < used.size(); ++i) {
-    if (!used[i]) continue;
-    points.push_back(surface.points[i]);
-    at_rim.push_back(border[i]);
-  }
-}
+Mandible::Mandible(const surface::Surface& surface)
+    : surface(surface),
+      at_rim(
+          surface::border_vertices(surface::EdgeTable(surface.triangles), surface.points.size())),
+      end(surface) {}
 
 void search_bones(const surface::Surface& skull, const Mandible& mandible, Search& search) {
   search_symphysis(FrontMap(mandible.surface, search.frame()), mandible.end, search);

@@ -22,8 +22,9 @@ struct Proposal {
 /// Finds landmarks from the shape of skin, skull and mandible (LPS, mm; the skin may be an open
 /// patch or raw): extremal points of the midsagittal profiles in a frame made by the skull's
 /// symmetry plane and the facial line, edges of the teeth, tops of the condyles, the crease between
-/// the lips. Landmarks in `given` are kept and guide the search of the others. Throws InputError
-/// where the surfaces are not those of one head in LPS.
+/// the lips. Points that coincide are merged, and specks left out. Landmarks in `given` are kept
+/// and guide the search of the others. Throws InputError where the surfaces are not those of one
+/// head in LPS.
 Proposal propose_landmarks(const surface::Surface& skin, const surface::Surface& skull,
                            const surface::Surface& mandible, const Landmarks& given);
 
