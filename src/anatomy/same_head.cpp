@@ -74,6 +74,21 @@ void require_near(const Placed& head, const std::string& file) {
   });
 }
 
+void require_soft_near_bone(const scene::Landmarks& landmarks, const std::string& file) {
+  constexpr double farthest = 40;  // mm
+  for (const auto& [soft, bone] : {std::pair{"nasion_soft", "nasion_bone"},
+                                   {"subnasale", "nasal_spine"},
+                                   {"b_soft", "b_point"},
+                                   {"pogonion_soft", "pogonion_bone"},
+                                   {"menton_soft", "menton_bone"}}) {
+    const Vec3 *skin = scene::find(landmarks, soft), *below = scene::find(landmarks, bone);
+    if (!skin || !below) continue;
+    if (const double apart = (*skin - *below).norm(); apart > farthest)
+      base::refuse("{}: {} lies {:.0f} mm from {}, at most {:g} mm in a head: place it again", file,
+                   soft, apart, bone, farthest);
+  }
+}
+
 /// Ways from landmarks, moved by a shift, to their surfaces, without those inside of bone.
 std::vector<Vec3> ways_to_surface(const Placed& head, const Vec3& shift) {
   std::vector<Vec3> ways;
@@ -137,6 +152,7 @@ void require_same_head(const scene::Landmarks& landmarks, const std::string& fil
                        const surface::Surface& skin, const std::vector<surface::Surface>& bones) {
   const Placed head(landmarks, skin, bones);
   require_near(head, file);
+  require_soft_near_bone(landmarks, file);
   require_unshifted(head, file);
   require_own_jaws(head, file);
 }

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <random>
 
 #include "repose/anatomy/propose.h"
@@ -56,6 +57,16 @@ TEST(SameHead, LandmarksAreAcceptedAsProposedAndWithErrorsOfPlacing) {
 
 TEST(SameHead, LandmarksOfAnotherHeadAreRefused) {
   EXPECT_NE(shipped_head().shifted({0, 40, 0}).find("another head"), std::string::npos);
+}
+
+TEST(SameHead, ALandmarkOfTheSkinFarFromItsBoneIsRefused) {
+  scene::Landmarks changed = shipped_head().landmarks;
+  const Vec3 bone = changed.at("pogonion_bone");
+  const auto away = [&](const Vec3& point) { return (point - bone).norm(); };
+  changed.at("pogonion_soft") = std::ranges::max(shipped_head().skin.points, {}, away);
+  EXPECT_NE(shipped_head().refused(changed).find("mm from pogonion_bone, at most 40 mm"),
+            std::string::npos)
+      << shipped_head().refused(changed);
 }
 
 TEST(SameHead, LandmarksThatAreShiftedAreRefused) {
