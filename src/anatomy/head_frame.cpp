@@ -9,6 +9,7 @@
 #include <numbers>
 
 #include "repose/base/error.h"
+#include "repose/surface/component.h"
 #include "repose/surface/edges.h"
 #include "repose/surface/triangle_tree.h"
 #include "search.h"
@@ -150,9 +151,10 @@ Fit refine(Plane plane, const MirrorFit& fit, double end = 1e-5) {
 /// on so many that a turned head, which the grid meets otherwise, has the same plane: first with
 /// the broad scale, of one minimum, then with that which leaves out what is not symmetric.
 Plane fit_plane(const surface::Surface& skull) {
+  constexpr double spacing = 2;  // mm
   const surface::TriangleTree tree(skull);
-  const std::vector<Vec3> few = thinned(skull.points, 300), more = thinned(skull.points, 3000),
-                          many = thinned(skull.points, 40000);
+  const std::vector<Vec3> many = thinned(surface::sample(skull, spacing).point, 40000),
+                          more = thinned(many, 3000), few = thinned(many, 300);
   const MirrorFit coarse(tree, few, 10), fine(tree, more, 5), broad(tree, many, 5),
       finest(tree, many, 2);
   std::vector<Fit> fits = best_of(first_planes(base::mean(few), coarse), 12);

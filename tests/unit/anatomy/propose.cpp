@@ -135,6 +135,36 @@ TEST(ProposeLandmarks, DoNotDependOnPointsThatCoincide) {
     EXPECT_LT((found.at(name) - place).norm(), 1e-6) << name;
 }
 
+/// A surface with triangles whose middle has z > 20 cut into four.
+surface::Surface subdivided_above(const surface::Surface& part) {
+  surface::Surface result{part.name, part.points, {}};
+  const auto middle = [&](int64_t a, int64_t b) {
+    result.points.push_back((part.points[a] + part.points[b]) / 2);
+    return static_cast<int64_t>(result.points.size()) - 1;
+  };
+  for (const Triangle& t : part.triangles) {
+    const auto& [a, b, c] = t;
+    if (base::mean(base::pick(part.points, t)).z() <= 20) {
+      result.triangles.push_back(t);
+      continue;
+    }
+    const int64_t ab = middle(a, b), bc = middle(b, c), ca = middle(c, a);
+    result.triangles.insert(result.triangles.end(),
+                            {{a, ab, ca}, {ab, b, bc}, {ca, bc, c}, {ab, bc, ca}});
+  }
+  return result;
+}
+
+TEST(ProposeLandmarks, HardlyDependOnTheSizeOfTriangles) {
+  Head head = shipped();
+  for (surface::Surface* part : {&head.skin, &head.skull, &head.mandible})
+    for (Vec3& p : part->points) p.x() += 2 * std::tanh(p.z() / 20);
+  const Landmarks expected = propose(head).found;
+  const Landmarks found = propose({head.skin, subdivided_above(head.skull), head.mandible}).found;
+  for (const auto& [name, place] : expected)
+    EXPECT_LT((found.at(name) - place).norm(), 0.3) << name;
+}
+
 /// Adds a tetrahedron with edges of `size` along the axes.
 void add_speck(surface::Surface& part, const Vec3& place, double size) {
   surface::append(
