@@ -82,8 +82,27 @@ void search_chin(const std::vector<ProfilePoint>& profile, double aside, Search&
              "no bone between pogonion and the lower incisors", aside);
 }
 
-void search_symphysis(const FrontMap& map, const ScanEnd& end, Search& search) {
+/// Menton: the middle of what lies less than 1 mm above the lowest point of a profile at x =
+/// `aside` that is seen from below. In front the lowest row of cells lies anywhere on a flat lower
+/// border.
+std::optional<ProfilePoint> menton_of(const Mandible& mandible, double aside,
+                                      const HeadFrame& frame) {
+  constexpr double flat = 1;  // mm
+  HeadFrame from_below = frame;
+  from_below.axes.row(1) = frame.axes.row(2);
+  from_below.axes.row(2) = -frame.axes.row(1);
+  const FrontMap map(mandible.surface, from_below);
+  const auto depth = [](const ProfilePoint& p) { return -p.x(); };
+  const auto itself = [](const ProfilePoint& p) { return p; };
+  const auto profile = map.profile(map.low_z(), map.high_z(), midline, aside);
+  if (profile.empty()) return std::nullopt;
+  const ProfilePoint lowest = mean_near_largest(profile, flat, depth, itself);
+  return ProfilePoint(-lowest.y(), lowest.x());
+}
+
+void search_symphysis(const Mandible& mandible, Search& search) {
   constexpr double cut = 3;  // mm
+  const FrontMap map(mandible.surface, search.frame());
   auto profile = map.profile(map.low_z(), map.high_z(), midline);
   const auto lacks = [&](const char* why) {
     for (const char* name : {"menton_bone", "pogonion_bone", "b_point", "lower_incisor_edge"})
@@ -99,8 +118,8 @@ void search_symphysis(const FrontMap& map, const ScanEnd& end, Search& search) {
     profile = map.profile(map.low_z(), map.high_z(), midline, aside);
     if (profile.empty()) return lacks("MANDIBLE has no bone in the middle of its chin");
   }
-  const ProfilePoint lowest = profile.front();
-  if (end.within(search.frame().to_scan({aside, lowest.x(), lowest.y()}), cut))
+  const ProfilePoint lowest = menton_of(mandible, aside, search.frame()).value_or(profile.front());
+  if (mandible.end.within(search.frame().to_scan({aside, lowest.x(), lowest.y()}), cut))
     return lacks("MANDIBLE is cut off flat at the chin, where the scan ends");
   search.put("menton_bone", lowest, "", aside);
   const double menton = search.find("menton_bone")->z();
@@ -277,7 +296,7 @@ Mandible::Mandible(const surface::Surface& surface)
       end(surface) {}
 
 void search_bones(const surface::Surface& skull, const Mandible& mandible, Search& search) {
-  search_symphysis(FrontMap(mandible.surface, search.frame()), mandible.end, search);
+  search_symphysis(mandible, search);
   for (const int side : {-1, 1}) search_ramus(mandible, side, search);
   remark_uneven(search);
   search_upper_jaw(FrontMap(skull, search.frame()), search);
