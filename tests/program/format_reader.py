@@ -3,6 +3,7 @@ the numbers of a step of a solid from /model and the step's positions."""
 
 import h5py
 import numpy as np
+from scipy.ndimage import minimum_filter
 
 from tissue import read
 
@@ -500,8 +501,8 @@ class Net:
         return np.einsum("ij,ijx->x", self.weights(where, derivatives), self.places(position))
 
     def samples(self, position):
-        """The surface at its controls' places."""
-        along, inwards = (np.array([straight_on(at, count, 0) for at in range(count)])
+        """The surface at multiples of a half from −1 on."""
+        along, inwards = (np.array([straight_on(at, count, 0) for at in np.arange(-1, count + 0.5, 0.5)])
                           for count in (self.columns, self.rows))
         return np.einsum("ik,jl,klx->ijx", along, inwards, self.places(position))
 
@@ -547,9 +548,11 @@ class Cut:
         at, other = self.first.point(position, own), self.second
         ends = np.array([other.columns, other.rows], float)
         samples = other.samples(position)
-        where = np.array(np.unravel_index(((samples - at)**2).sum(2).argmin(), samples.shape[:2]),
-                         float)
-        where = self.foot(position, at, where, ends)
+        far = np.linalg.norm(samples - at, axis=2)
+        least = minimum_filter(far, 3, mode="nearest") == far
+        feet = [self.foot(position, at, 0.5 * start - 1, ends)
+                for start in np.argwhere(least & (far <= 2 * far.min()))]
+        where = min(feet, key=lambda foot: np.linalg.norm(at - other.point(position, foot)))
         way = at - other.point(position, where)
         normal = np.cross(*(other.point(position, where, order) for order in ((1, 0), (0, 1))))
         if (where <= -1).any() or (where >= ends).any():

@@ -44,7 +44,7 @@ std::array<std::array<double, 4>, 2> spline_weights(double t) {
 struct AtPoint {
   double gap = considered;               // mm, the smaller of that to bodies and that to cuts
   double body_gap = considered;          // mm
-  std::vector<double> wall_gaps;         // of all places, at all minima
+  std::vector<double> wall_gaps;         // of all places, at all nearest feet
   double largest_wall_gap = considered;  // smallest over the places of their largest
   int32_t body = -1;                     // that it is to; −1: the side of a cut
   std::vector<int32_t> pressing;         // bodies that may press
@@ -249,8 +249,8 @@ class Claims {
   Comparison& comparison_;
 };
 
-/// The gap of a point that is nearest to a stated one: that of each of its places may be at any
-/// minimum.
+/// The gap of a point that is nearest to a stated one: that of each of its places may be at any of
+/// feet as near.
 double nearest_gap(const AtPoint& point, double stated) {
   double nearest = point.gap;
   const auto offer = [&](double gap) {

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <map>
 
 namespace repose::tools::check {
 
@@ -37,6 +38,8 @@ class Side {
         control += cuts.weight[k] * position[cuts.point[k]];
       controls_.push_back(control);
     }
+    for (int i = 0; i <= 2 * (columns + 1); ++i)
+      for (int j = 0; j <= 2 * (rows + 1); ++j) halves_[{i, j}] = point(at_half(i, j));
   }
 
   Vec3 point(const Parameters& at) const {
@@ -48,6 +51,19 @@ class Side {
             sum(at, [](double x, double y) { return bell(x) * bell_slope(y); })};
   }
   Parameters end() const { return {columns_, rows_}; }
+  /// Half parameters where this is nearer to a place than at those around.
+  std::vector<Parameters> nearer_than_around(const Vec3& place) const {
+    std::vector<Parameters> found;
+    for (const auto& [number, half] : halves_) {
+      bool nearer = true;
+      for (const auto& [i, j] : {std::pair{-1, 0}, {1, 0}, {0, -1}, {0, 1}})
+        if (const auto beside = halves_.find({number[0] + i, number[1] + j});
+            beside != halves_.end())
+          nearer = nearer && (half - place).norm() <= (beside->second - place).norm();
+      if (nearer) found.push_back(at_half(number[0], number[1]));
+    }
+    return found;
+  }
 
  private:
   /// A control; those beyond the ends lie in a straight line with the last two.
@@ -75,25 +91,14 @@ class Side {
     return sum;
   }
 
+  static Parameters at_half(int i, int j) { return {0.5 * i - 1, 0.5 * j - 1}; }
+
   int columns_, rows_;
-  std::vector<Vec3> controls_;  // column by column
+  std::vector<Vec3> controls_;                 // column by column
+  std::map<std::array<int, 2>, Vec3> halves_;  // points, from −1 on
 };
 
-/// The nearest of a side's points at whole parameters.
-Parameters nearest_whole(const Side& side, const Vec3& place) {
-  Parameters nearest(0, 0);
-  double minimum = (side.point(nearest) - place).squaredNorm();
-  for (int i = 0; i < side.end()[0]; ++i)
-    for (int j = 0; j < side.end()[1]; ++j) {
-      const double squared = (side.point({i, j}) - place).squaredNorm();
-      if (squared >= minimum) continue;
-      minimum = squared;
-      nearest = {i, j};
-    }
-  return nearest;
-}
-
-/// Parameters at which the distance to `place` is least, from `at` on: steps to the best of eight
+/// Parameters at which the distance to `place` is least, from `at` on: steps to the best of 24
 /// neighbors, halved where none is nearer. Of several minima, `first` steps that are long may reach
 /// another one than those that are short.
 Parameters descend(const Side& side, const Vec3& place, Parameters at, double first) {
@@ -101,8 +106,8 @@ Parameters descend(const Side& side, const Vec3& place, Parameters at, double fi
   double minimum = (side.point(at) - place).squaredNorm();
   for (double step = first; step > last;) {
     Parameters best = at;
-    for (const int i : {-1, 0, 1})
-      for (const int j : {-1, 0, 1}) {
+    for (const double i : {-1.0, -0.5, 0.0, 0.5, 1.0})
+      for (const double j : {-1.0, -0.5, 0.0, 0.5, 1.0}) {
         const Parameters next = (at + step * Parameters(i, j)).cwiseMax(-1.0).cwiseMin(side.end());
         const double squared = (side.point(next) - place).squaredNorm();
         if (squared >= minimum) continue;
@@ -115,7 +120,10 @@ Parameters descend(const Side& side, const Vec3& place, Parameters at, double fi
   return at;
 }
 
-double gap_from(const Side& side, const Vec3& place, const Parameters& start, double first) {
+struct Foot {
+  double distance, gap;
+};
+Foot foot_from(const Side& side, const Vec3& place, const Parameters& start, double first) {
   constexpr double at_end = 1e-6;
   const Parameters foot = descend(side, place, start, first);
   const Vec3 offset = place - side.point(foot);
@@ -123,22 +131,21 @@ double gap_from(const Side& side, const Vec3& place, const Parameters& start, do
   const Vec3 normal = along.cross(inwards);
   const bool opposite =
       foot.minCoeff() > -1 + at_end && (side.end() - foot).minCoeff() > at_end && normal.norm() > 0;
-  return opposite ? normal.normalized().dot(offset) : offset.norm();
+  return {offset.norm(), opposite ? normal.normalized().dot(offset) : offset.norm()};
 }
 
-/// By long and by short steps from the nearest of a side's points at whole parameters, then by long
-/// ones from those around it.
-std::vector<double> gaps_around(const Side& side, const Vec3& place) {
-  const Parameters start = nearest_whole(side, place);
-  std::vector<double> gaps = {gap_from(side, place, start, 1.0 / 4),
-                              gap_from(side, place, start, 1.0 / 32)};
-  for (const int i : {-1, 0, 1})
-    for (const int j : {-1, 0, 1}) {
-      const Parameters from = start + Parameters(i, j);
-      if (from.minCoeff() >= 0 && (side.end() - from).minCoeff() >= 1 && from != start)
-        for (const double first : {1.0 / 4, 1.0 / 32})
-          gaps.push_back(gap_from(side, place, from, first));
-    }
+/// The gap from the nearest foot, first, and those from others as near. Feet are found by long and
+/// by short steps from all of a side's points at half parameters that are nearer than those around.
+std::vector<double> gaps_of(const Side& side, const Vec3& place) {
+  constexpr double as_near = 1e-6;  // mm
+  std::vector<Foot> feet;
+  for (const Parameters& start : side.nearer_than_around(place))
+    for (const double first : {1.0 / 4, 1.0 / 32})
+      feet.push_back(foot_from(side, place, start, first));
+  std::ranges::sort(feet, {}, &Foot::distance);
+  std::vector<double> gaps;
+  for (const Foot& foot : feet)
+    if (foot.distance <= feet.front().distance + as_near) gaps.push_back(foot.gap);
   return gaps;
 }
 
@@ -155,7 +162,7 @@ std::vector<CutGap> cut_gaps(const model::CutFaces& cuts, std::span<const Vec3> 
     for (size_t c = 0; c < count; ++c, ++place) {
       if (!(cuts.area[place] > 0)) continue;
       const Vec3 at = own.point({c / rows, c % rows});
-      gaps.push_back({cuts.point[cuts.begin[first + c]], gaps_around(other, at)});
+      gaps.push_back({cuts.point[cuts.begin[first + c]], gaps_of(other, at)});
     }
     first += 2 * count;
   }

@@ -9,7 +9,7 @@ namespace repose::tools::check {
 /// Gap of one place on the first side of a cut to the second side.
 struct CutGap {
   int64_t point;            ///< at which the place counts
-  std::vector<double> gap;  ///< mm, at the minima of the distance that searches from around end at
+  std::vector<double> gap;  ///< mm, at the nearest foot, first, and at others as near
 };
 
 /// Returns the gaps between the sides of all cuts, as docs/reference/formats.md defines them.
