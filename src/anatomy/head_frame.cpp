@@ -62,18 +62,28 @@ std::vector<Vec3> thinned(const std::vector<Vec3>& points, size_t number) {
   return chosen;
 }
 
-/// The mirror image of a skull in a plane, compared with the skull: Σ d²/(1 + d²/s²) over points, d
-/// mm from their image to the surface, so that points without a partner hardly count.
+/// The vertices of a surface, with a third of the areas of the triangles around.
+surface::Samples vertices(const surface::Surface& surface) {
+  surface::Samples samples{surface.points, std::vector<double>(surface.points.size())};
+  for (const Triangle& t : surface.triangles) {
+    const auto [a, b, c] = surface::corners(surface, t);
+    for (const int64_t corner : t) samples.area[corner] += (b - a).cross(c - a).norm() / 6;
+  }
+  return samples;
+}
+
+/// The mirror image of a skull in a plane, compared with the skull: Σ a d²/(1 + d²/s²) over points
+/// of areas a, d mm from their image to the surface, so that points without a partner hardly count.
 class MirrorFit {
  public:
-  MirrorFit(const surface::TriangleTree& tree, const std::vector<Vec3>& points, double scale)
+  MirrorFit(const surface::TriangleTree& tree, const surface::Samples& points, double scale)
       : tree_(tree), points_(points), scale_(scale) {}
 
   double off(const Plane& plane) const {
     double sum = 0;
-    for (const Vec3& p : points_) {
-      const double squared = tree_.nearest(plane.mirrored(p)).squared;
-      sum += squared / (1 + squared / (scale_ * scale_));
+    for (size_t i = 0; i < points_.point.size(); ++i) {
+      const double squared = tree_.nearest(plane.mirrored(points_.point[i])).squared;
+      sum += points_.area[i] * squared / (1 + squared / (scale_ * scale_));
     }
     return sum;
   }
@@ -81,7 +91,7 @@ class MirrorFit {
 
  private:
   const surface::TriangleTree& tree_;
-  const std::vector<Vec3>& points_;
+  const surface::Samples& points_;
   double scale_;
 };
 
@@ -90,7 +100,8 @@ Plane MirrorFit::next(const Plane& plane) const {
   const Vec3 n = plane.normal, a = n.unitOrthogonal(), b = n.cross(a);
   Mat3 matrix = Mat3::Zero();
   Vec3 right = Vec3::Zero();
-  for (const Vec3& p : points_) {
+  for (size_t i = 0; i < points_.point.size(); ++i) {
+    const Vec3& p = points_.point[i];
     const Vec3 image = plane.mirrored(p), way = image - tree_.nearest(image).point;
     const double d = way.norm();
     if (d == 0) continue;
@@ -99,7 +110,7 @@ Plane MirrorFit::next(const Plane& plane) const {
       return -2 * (u.dot(n) * arm.dot(axis) + u.dot(axis) * arm.dot(n));
     };
     const Vec3 row(turned(a), turned(b), 2 * u.dot(n));
-    const double root = 1 + d * d / (scale_ * scale_), weight = 1 / (root * root);
+    const double root = 1 + d * d / (scale_ * scale_), weight = points_.area[i] / (root * root);
     matrix += weight * row * row.transpose();
     right -= weight * d * row;
   }
@@ -148,16 +159,23 @@ Fit refine(Plane plane, const MirrorFit& fit, double end = 1e-5) {
 }
 
 /// Many directions are tried on few points, the best planes refined on more, and the best of these
-/// on so many that a turned head, which the grid meets otherwise, has the same plane: first with
-/// the broad scale, of one minimum, then with that which leaves out what is not symmetric.
+/// on vertices, which turn with a head, or on so many points that a turned head, which the grid
+/// meets otherwise, has the same plane: first with the broad scale, of one minimum, then with that
+/// which leaves out what is not symmetric.
 Plane fit_plane(const surface::Surface& skull) {
   constexpr double spacing = 2;  // mm
+  constexpr size_t most = 40000;
   const surface::TriangleTree tree(skull);
-  const std::vector<Vec3> many = thinned(surface::sample(skull, spacing).point, 40000),
-                          more = thinned(many, 3000), few = thinned(many, 300);
+  const std::vector<Vec3> spread = surface::sample(skull, spacing).point;
+  const auto evenly = [&](size_t number) {
+    const std::vector<Vec3> points = thinned(spread, number);
+    return surface::Samples{points, std::vector<double>(points.size(), 1.0)};
+  };
+  const surface::Samples few = evenly(300), more = evenly(3000),
+                         many = skull.points.size() <= most ? vertices(skull) : evenly(most);
   const MirrorFit coarse(tree, few, 10), fine(tree, more, 5), broad(tree, many, 5),
       finest(tree, many, 2);
-  std::vector<Fit> fits = best_of(first_planes(base::mean(few), coarse), 12);
+  std::vector<Fit> fits = best_of(first_planes(base::mean(few.point), coarse), 12);
   for (Fit& fit : fits) fit = refine(fit.plane, coarse);
   fits = best_of(std::move(fits), 3);
   for (Fit& fit : fits) fit = refine(fit.plane, fine);
