@@ -228,10 +228,13 @@ int64_t model_bytes(const model::Model& model, const model::ModelRows& slabs,
   const int64_t point = 3 * 3 * 8 + 1 + 4 + 8 + 4 + 8, spring = 2 * 8 + 4 + 8 + 8 + 1 + 8;
   const model::Counts& all = slabs.counts;
   const size_t descriptions = (size_t{1} << 16) + (model.bones.size() << 12);
-  size_t elements = 0;
+  size_t elements = 0, instruments = 0;
   for (const model::TermElements& of : model.elements)
     elements += 8 * (of.points.size() + of.numbers.size());
-  const size_t bytes = descriptions + elements + slabs.contact_pairs * 21 +
+  for (const model::Body& body : model.contact.bodies)
+    if (const auto* mesh = std::get_if<surface::Surface>(&body.shape))
+      instruments += (mesh->points.size() + mesh->triangles.size()) * 3 * 8 + (size_t{1} << 12);
+  const size_t bytes = descriptions + elements + instruments + slabs.contact_pairs * 21 +
                        model.contact.cut_faces.point.size() * 50 + model.skin.size() * 3 * 8 +
                        bones.points.size() * 2 * 3 * 8 + bones.triangles.size() * (2 * 3 * 8 + 4);
   return static_cast<int64_t>(bytes) + all.points * point + all.springs * spring +

@@ -160,7 +160,7 @@ void ResultFile::State::append(const model::StepNumbers& numbers, const model::S
                                bool provisional_step) {
   const std::scoped_lock lock(mutex);
   const model::StepNumbers same = of_first_rank(part.comm(), numbers);
-  part.open(writer->bytes());
+  part.open(writer->bytes(rows));
   settle_last();
   writer->write(same, rows);
   provisional = provisional_step;

@@ -19,7 +19,6 @@ class StepViews {
   FileCounts& counts() { return counts_; }
   const FileCounts& counts() const { return counts_; }
   const std::vector<double>& loads() const { return loads_; }
-  size_t optional_fields() const { return fields_.size(); }
 
   /// Adds a step at a load; `bones_moved`: it stores moved bone surfaces.
   void add(double load, bool bones_moved);

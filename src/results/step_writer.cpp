@@ -27,10 +27,13 @@ StepWriter::StepWriter(const SharedPart& part, StepViews& views, const model::Mo
       initial_(slabs.points.position),
       outward_(slabs.outward) {}
 
-int64_t StepWriter::bytes() const {
+int64_t StepWriter::bytes(const model::StepRows& rows) const {
   const FileCounts& counts = views_.counts();
-  return (88 + 24 * static_cast<int64_t>(views_.optional_fields())) * counts.points +
-         16 * counts.springs + 48 * counts.prisms + 48 * counts.bone_points + (int64_t{1} << 16);
+  int64_t point = 3 * 24 + 2 * 8;
+  for (const model::PointField& field : rows.point_fields) point += field.vector ? 24 : 8;
+  const auto descriptions = static_cast<int64_t>(64 + rows.point_fields.size()) << 10;
+  return point * counts.points + 16 * counts.springs + 48 * counts.prisms +
+         48 * counts.bone_points + descriptions;
 }
 
 void StepWriter::write_field(hid_t group, const model::PointField& field) {

@@ -39,8 +39,8 @@ class StepWriter {
   StepWriter(const SharedPart& part, StepViews& views, const model::ModelRows& slabs,
              MergedBones bones, std::optional<model::PrescribedMotion> motion);
 
-  /// Returns enough bytes for a step, its descriptions included.
-  int64_t bytes() const;
+  /// Returns enough bytes for a step with the fields that `rows` hold, its descriptions included.
+  int64_t bytes(const model::StepRows& rows) const;
   /// Writes the next step; the numbers are the same on all ranks. Throws InternalError where an
   /// array is not this rank's slab.
   void write(const model::StepNumbers& numbers, const model::StepRows& rows);

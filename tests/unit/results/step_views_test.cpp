@@ -43,7 +43,6 @@ TEST(StepViews, AnArrayGoesWithTheLastStepThatHasIt) {
   views.note_field("advance", false, 2);
   views.remove_last();
   EXPECT_EQ(views.loads(), (std::vector<double>{0, 0.5}));
-  EXPECT_EQ(views.optional_fields(), 0u);
   EXPECT_TRUE(steps_with(views, "advance").empty());
 }
 
