@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <map>
 
 #include "cut_faces.h"
@@ -89,9 +90,10 @@ class Bodies {
     const Mat4& pose = poses_[body];
     return pose.topLeftCorner<3, 3>().transpose() * (point - pose.topRightCorner<3, 1>());
   }
-  /// mm, of a point given by beside(); to a mesh at most `reach`.
+  /// mm, of a point given by beside(); to a mesh at most `reach`, inside it of any size.
   double distance(int32_t body, const Vec3& beside) const {
-    return shapes_[body].distance(beside, reach);
+    const double nearby = shapes_[body].distance(beside, reach);
+    return nearby > -reach ? nearby : shapes_[body].distance(beside, infinite);
   }
   /// mm, of a point given by beside(), as the solver computes it: to a mesh by a cubic B-spline.
   double solver_distance(int32_t body, const Vec3& beside) const {
@@ -140,6 +142,7 @@ class Bodies {
     return known->second;
   }
 
+  static constexpr double infinite = std::numeric_limits<double>::infinity();
   static constexpr double reach = considered + 2;  // mm
   double spacing_;                                 // mm
   double kept_;                                    // mm, up to which the solver keeps distances
