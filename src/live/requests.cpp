@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <chrono>
 #include <span>
 #include <utility>
@@ -59,9 +60,10 @@ void Requests::read() {
   std::array<char, 1 << 16> buffer;
   while (true) {
     std::array<pollfd, 2> watched = {pollfd{input_, POLLIN, 0}, pollfd{stop_[0], POLLIN, 0}};
-    if (poll(watched.data(), watched.size(), -1) < 0) continue;
-    if (watched[1].revents != 0) break;
-    const ssize_t count = ::read(input_, buffer.data(), buffer.size());
+    ssize_t count = poll(watched.data(), watched.size(), -1);
+    if (count > 0 && watched[1].revents != 0) break;
+    if (count > 0) count = ::read(input_, buffer.data(), buffer.size());
+    if (count < 0 && errno == EINTR) continue;
     if (count <= 0) break;
     for (const char letter : std::span(buffer.data(), static_cast<size_t>(count)))
       if (letter == '\n')
