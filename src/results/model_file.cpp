@@ -19,8 +19,8 @@ void require_format(const Reader& in) {
     in.refuse("/ attribute version", "is {}, this program reads version 1", version);
 }
 
-/// Reads the arrays of a group, all of as many rows as the first. The `optional` ones may be
-/// absent.
+/// Reads the arrays of a group, but for the sides of cuts all of as many rows as the first. The
+/// `optional` ones may be absent.
 template <class Group>
 void read_arrays(const Reader& in, const std::string& group, Group& of,
                  std::initializer_list<std::string_view> optional = {}) {
@@ -30,7 +30,7 @@ void read_arrays(const Reader& in, const std::string& group, Group& of,
     const bool may_lack = std::find(optional.begin(), optional.end(), name) != optional.end();
     if (may_lack && !in.has(path)) return;
     in.read(path, rows, values);
-    rows = in.rows(path);
+    if constexpr (!std::is_same_v<Group, model::CutFaces>) rows = in.rows(path);
   });
 }
 
@@ -115,13 +115,7 @@ model::Contact read_contact(const Reader& in) {
                               push[k]});
   }
   read_arrays(in, group, contact.pairs);
-  if (!in.has(group + "/wall")) return contact;
-  model::CutFaces& cut_faces = contact.cut_faces;
-  in.read(group + "/wall/net", Shape::any, cut_faces.size);
-  in.read(group + "/wall/begin", Shape::any, cut_faces.begin);
-  in.read(group + "/wall/point", Shape::any, cut_faces.point);
-  in.read(group + "/wall/weight", static_cast<int64_t>(cut_faces.point.size()), cut_faces.weight);
-  in.read(group + "/wall/area", Shape::any, cut_faces.area);
+  if (in.has(group + "/wall")) read_arrays(in, group + "/wall", contact.cut_faces);
   return contact;
 }
 

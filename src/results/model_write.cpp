@@ -85,14 +85,11 @@ void write_contact(hid_t model, const model::Contact& contact, const model::Mode
   write_attribute(group, "grid", contact.spacing);
   write_bodies(group, contact.bodies);
   create_arrays(group, slabs.pairs, slabs.contact_pairs);
-  const model::CutFaces& cut_faces = contact.cut_faces;
-  if (cut_faces.empty()) return;
+  if (contact.cut_faces.empty()) return;
   const base::Hdf5Group wall = base::create_hdf5_group(group, "wall");
-  write_array(wall, "net", cut_faces.size);
-  write_array(wall, "begin", cut_faces.begin);
-  write_array(wall, "point", cut_faces.point);
-  write_array(wall, "weight", cut_faces.weight);
-  write_array(wall, "area", cut_faces.area);
+  model::for_each_array(contact.cut_faces, [&](const char* name, const auto& values) {
+    write_array(wall, name, values);
+  });
 }
 
 void write_adhesion(hid_t model, const model::AdhesionRule& rule) {

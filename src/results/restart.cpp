@@ -102,12 +102,7 @@ class Numbers {
 void add_contact(const model::Contact& contact, Numbers& numbers) {
   numbers.add_group("contact", contact.pairs);
   numbers("contact", std::vector{contact.stiffness, contact.spacing});
-  const model::CutFaces& faces = contact.cut_faces;
-  numbers("contact/wall/net", faces.size);
-  numbers("contact/wall/begin", faces.begin);
-  numbers("contact/wall/point", faces.point);
-  numbers("contact/wall/weight", faces.weight);
-  numbers("contact/wall/area", faces.area);
+  numbers.add_group("contact/wall", contact.cut_faces);
   for (const model::Body& body : contact.bodies) {
     numbers("body_push", std::vector{body.push});
     numbers("body_shape", shape_row(body));

@@ -128,7 +128,8 @@ struct Counts {
 Counts count(const Model& model);
 
 /// Calls visit(name, array) for each array of a group (points, springs, prisms, edges, contact
-/// pairs), with its name and in its order in a file; of prisms only those that they have.
+/// pairs, sides of cuts), with its name and in its order in a file; of prisms only those that they
+/// have.
 template <class Group, class Visit>
 void for_each_array(Group& of, Visit&& visit) {
   if constexpr (requires { of.target; }) {
@@ -159,6 +160,12 @@ void for_each_array(Group& of, Visit&& visit) {
     visit("point", of.point);
     visit("body_row", of.body);
     visit("binding", of.binding);
+    visit("area", of.area);
+  } else if constexpr (requires { of.begin; }) {
+    visit("net", of.size);
+    visit("begin", of.begin);
+    visit("point", of.point);
+    visit("weight", of.weight);
     visit("area", of.area);
   } else {
     visit("points", of.points);
