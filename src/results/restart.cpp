@@ -57,72 +57,67 @@ void refuse_another_model(const std::filesystem::path& file, const model::Model&
 class Numbers {
  public:
   template <class Row>
-  void operator()(const char* array, const std::vector<Row>& rows) {
-    names_.push_back(group_ + array);
-    lists_.emplace_back();
-    for (const Row& row : rows) add(row);
+  void add(const std::string& array, const std::vector<Row>& rows) {
+    std::vector<double>& list = lists_.emplace_back(array, std::vector<double>()).second;
+    for (const Row& row : rows)
+      if constexpr (std::is_arithmetic_v<Row> || std::is_enum_v<Row>)
+        list.push_back(static_cast<double>(row));
+      else
+        list.insert(list.end(), row.data(), row.data() + row.size());
   }
   /// Adds the arrays of a group of the file.
   template <class Arrays>
   void add_group(const std::string& name, const Arrays& arrays) {
-    group_ = name + "/";
-    model::for_each_array(arrays, *this);
-    group_.clear();
+    model::for_each_array(arrays, [&](const char* array, const auto& rows) {
+      add(fmt::format("{}/{}", name, array), rows);
+    });
   }
   /// Returns the first array that differs by more than rounding, with which an initial equilibrium
   /// depends on the ranks; empty where there is none.
   std::string first_difference(const Numbers& other) const {
-    const size_t shared = std::min(names_.size(), other.names_.size());
-    for (size_t k = 0; k < shared; ++k)
-      if (names_[k] != other.names_[k] || !are_close(lists_[k], other.lists_[k])) return names_[k];
-    if (names_.size() == other.names_.size()) return {};
-    return names_.size() > shared ? names_[shared] : other.names_[shared];
+    const auto [here, there] = std::ranges::mismatch(lists_, other.lists_, are_close);
+    if (here != lists_.end()) return here->first;
+    return there != other.lists_.end() ? there->first : "";
   }
 
  private:
-  template <class Row>
-  void add(const Row& row) {
-    if constexpr (std::is_arithmetic_v<Row> || std::is_enum_v<Row>)
-      lists_.back().push_back(static_cast<double>(row));
-    else
-      for (int k = 0; k < static_cast<int>(row.size()); ++k) lists_.back().push_back(row.data()[k]);
-  }
-  static bool are_close(const std::vector<double>& one, const std::vector<double>& other) {
+  using List = std::pair<std::string, std::vector<double>>;
+  static bool are_close(const List& one, const List& other) {
     constexpr double rounding = 1e-9;
     double largest = 0;
-    for (const double number : one) largest = std::max(largest, std::abs(number));
-    return std::equal(one.begin(), one.end(), other.begin(), other.end(),
-                      [&](double a, double b) { return std::abs(a - b) <= rounding * largest; });
+    for (const double number : one.second) largest = std::max(largest, std::abs(number));
+    return one.first == other.first &&
+           std::ranges::equal(one.second, other.second, [&](double a, double b) {
+             return std::abs(a - b) <= rounding * largest;
+           });
   }
-  std::string group_;
-  std::vector<std::string> names_;
-  std::vector<std::vector<double>> lists_;
+  std::vector<List> lists_;
 };
 
 void add_contact(const model::Contact& contact, Numbers& numbers) {
   numbers.add_group("contact", contact.pairs);
-  numbers("contact", std::vector{contact.stiffness, contact.spacing});
+  numbers.add("contact", std::vector{contact.stiffness, contact.spacing});
   numbers.add_group("contact/wall", contact.cut_faces);
   for (const model::Body& body : contact.bodies) {
-    numbers("body_push", std::vector{body.push});
-    numbers("body_shape", shape_row(body));
+    numbers.add("body_push", std::vector{body.push});
+    numbers.add("body_shape", shape_row(body));
     const auto* mesh = std::get_if<surface::Surface>(&body.shape);
-    if (body.bone < 0 && mesh) numbers("body mesh", mesh->points);
+    if (body.bone < 0 && mesh) numbers.add("body mesh", mesh->points);
   }
 }
 
 Numbers numbers_of(const model::Model& m) {
   Numbers numbers;
-  numbers("gravity", std::vector{m.gravity});
+  numbers.add("gravity", std::vector{m.gravity});
   numbers.add_group("point", m.points);
   numbers.add_group("prism", m.prisms);
   numbers.add_group("edge", m.edges);
-  numbers("bone_transform", m.bone_transform);
+  numbers.add("bone_transform", m.bone_transform);
   if (!m.contact.empty()) add_contact(m.contact, numbers);
   numbers.add_group("spring", m.springs);
   for (const model::TermElements& elements : m.elements) {
-    numbers((elements.term + "/points").c_str(), elements.points);
-    numbers((elements.term + "/numbers").c_str(), elements.numbers);
+    numbers.add(elements.term + "/points", elements.points);
+    numbers.add(elements.term + "/numbers", elements.numbers);
   }
   return numbers;
 }
