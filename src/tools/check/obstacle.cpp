@@ -185,21 +185,26 @@ double TriangleGrid::winding_number(const Vec3& point) const {
 
 namespace {
 
-double signed_distance(const scene::Sphere& ball, const Vec3& p) {
+double signed_distance(const scene::Sphere& ball, const Vec3& p, double) {
   return (p - ball.center).norm() - ball.radius;
 }
 
-double signed_distance(const scene::Capsule& capsule, const Vec3& p) {
+double signed_distance(const scene::Capsule& capsule, const Vec3& p, double) {
   return (p - closest_on_segment(p, capsule.from, capsule.to)).norm() - capsule.radius;
 }
 
-double signed_distance(const scene::Box& box, const Vec3& p) {
+double signed_distance(const scene::Box& box, const Vec3& p, double) {
   const Vec3 beyond = (p - box.center).cwiseAbs() - box.size / 2;
   return std::min(beyond.maxCoeff(), 0.0) + beyond.cwiseMax(0.0).norm();
 }
 
-double signed_distance(const scene::HalfSpace& half, const Vec3& p) {
+double signed_distance(const scene::HalfSpace& half, const Vec3& p, double) {
   return (p - half.point).dot(half.normal) / half.normal.norm();
+}
+
+double signed_distance(const TriangleGrid& mesh, const Vec3& p, double reach) {
+  const double apart = mesh.distance(p, reach);
+  return mesh.contains(p) ? -apart : apart;
 }
 
 Vec3 outward(const scene::Sphere& ball, const Vec3& p) { return p - ball.center; }
@@ -217,6 +222,8 @@ Vec3 outward(const scene::Box& box, const Vec3& p) {
 }
 
 Vec3 outward(const scene::HalfSpace& half, const Vec3&) { return half.normal; }
+
+Vec3 outward(const TriangleGrid&, const Vec3&) { return Vec3::Zero(); }
 
 }  // namespace
 
@@ -236,29 +243,12 @@ Obstacle::Obstacle(const model::Model& model, const model::Body& body) {
 }
 
 double Obstacle::distance(const Vec3& point, double reach) const {
-  if (const auto* mesh = std::get_if<TriangleGrid>(&shape_)) {
-    const double apart = mesh->distance(point, reach);
-    return mesh->contains(point) ? -apart : apart;
-  }
-  return std::visit(
-      [&](const auto& shape) -> double {
-        if constexpr (std::is_same_v<std::decay_t<decltype(shape)>, TriangleGrid>)
-          return reach;
-        else
-          return signed_distance(shape, point);
-      },
-      shape_);
+  return std::visit([&](const auto& shape) { return signed_distance(shape, point, reach); },
+                    shape_);
 }
 
 Vec3 Obstacle::normal(const Vec3& point) const {
-  return std::visit(
-      [&](const auto& shape) -> Vec3 {
-        if constexpr (std::is_same_v<std::decay_t<decltype(shape)>, TriangleGrid>)
-          return Vec3::Zero();
-        else
-          return outward(shape, point).normalized();
-      },
-      shape_);
+  return std::visit([&](const auto& shape) { return outward(shape, point).normalized(); }, shape_);
 }
 
 }  // namespace repose::tools::check
