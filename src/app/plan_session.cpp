@@ -86,6 +86,7 @@ void require_plan(const std::filesystem::path& input, const Job& job) {
 struct PlanSession::State {
   MPI_Comm comm;
   Job job;
+  std::optional<SolvedSkin> skin;
   std::vector<Piece> pieces;
   solve::Derivatives derivatives;  // its pieces at the latest plan
   scene::Plan box;
@@ -103,7 +104,7 @@ struct PlanSession::State {
   Base* base(const Placements& placements, const std::function<bool()>& abandoned);
   void precondition(Base& base);
   solve::Start start_at(const Base& base, const Placements& placements) const;
-  std::string describe(const SolvedSkin& skin, const std::vector<Vec3>& now);
+  std::string describe(const std::vector<Vec3>& now);
 };
 
 void PlanSession::State::require_inside(const Placements& placements) const {
@@ -206,14 +207,14 @@ solve::Start PlanSession::State::start_at(const Base& base, const Placements& pl
 }
 
 /// Describes the last answer, whose skin has the points `now`. Collective; on rank 0.
-std::string PlanSession::State::describe(const SolvedSkin& skin, const std::vector<Vec3>& now) {
+std::string PlanSession::State::describe(const std::vector<Vec3>& now) {
   const auto& [plan, accuracy, numbers, rows, summary] = *last;
   std::string text = describe_folds(comm, part(), numbers.inverted_prisms, rows.volume_ratio);
   base::on_root(comm, [&] {
     model::Anatomy& anatomy = *job.anatomy;
     anatomy.move_warnings = model::describe_overlaps_at_end(anatomy.bones, anatomy.scene);
-    text = describe_answer(job, skin, now, summary, -1) + text + describe_failure(job, summary) +
-           describe_touching(job, skin, now, summary);
+    text = describe_answer(job, *skin, now, summary, -1) + text + describe_failure(job, summary) +
+           describe_touching(job, *skin, now, summary);
   });
   return text;
 }
@@ -228,6 +229,7 @@ PlanSession::PlanSession(MPI_Comm comm, const std::filesystem::path& input,
     require_plan(input, s.job);
     s.box = *s.job.anatomy->scene.plan;
   });
+  s.skin.emplace(comm, s.job);
   s.box.pieces.clear();
   base::broadcast(comm, s.box.translate, s.box.rotate);
   s.settings = settings_of(s.job.requested, s.job.local_model.part.solid);
@@ -261,11 +263,8 @@ Mat3 PlanSession::axes() const {
   return scene::head_axes(anatomy ? anatomy->scene.landmarks : scene::Landmarks());
 }
 
-std::vector<Vec3> PlanSession::initial() const {
-  State& s = *state_;
-  const discrete::NaturalRows natural(s.comm, s.part());
-  return base::gather(s.comm, natural.natural(s.part().model.points.position));
-}
+const surface::Surface& PlanSession::skin() const { return state_->skin->initial(); }
+const std::vector<int64_t>& PlanSession::skin_rows() const { return state_->skin->rows(); }
 
 int64_t PlanSession::points() const { return state_->part().total_points; }
 
@@ -297,10 +296,7 @@ PlanSession::Answer PlanSession::solve(const Request& request) {
   answer.position = base::gather(s.comm, solved.rows.position);
   answer.field = gather_fields(s.comm, solved.rows.point_fields);
   s.last = std::move(solved);
-  if (request.described) {
-    const SolvedSkin skin(s.comm, s.job);
-    answer.description = s.describe(skin, skin.points_at(s.last->rows.position));
-  }
+  if (request.described) answer.description = s.describe(s.skin->points_at(s.last->rows.position));
   return answer;
 }
 
@@ -321,10 +317,9 @@ std::string PlanSession::write(const std::filesystem::path& name) {
   file.append(last.numbers, last.rows);
   file.commit();
   const std::string result = name.string() + ".h5";
-  const SolvedSkin skin(s.comm, s.job);
-  const std::vector<Vec3> now = skin.points_at(last.rows.position);
-  std::string text = s.describe(skin, now);
-  const std::string given = write_given_skin(s.comm, s.job, name.string(), skin, now);
+  const std::vector<Vec3> now = s.skin->points_at(last.rows.position);
+  std::string text = s.describe(now);
+  const std::string given = write_given_skin(s.comm, s.job, name.string(), *s.skin, now);
   base::on_root(s.comm, [&] {
     text += report_row("result", "{}, {}_*.xdmf (ParaView)", result, name.string()) + given;
     const std::string refused = results::add_summary(result, text);

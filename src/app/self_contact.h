@@ -19,13 +19,15 @@ class SolvedSkin {
   std::string describe_self_contact(const std::vector<Vec3>& points) const;
 
   const surface::Surface& initial() const { return initial_; }
+  /// Rows of its points in the model, ascending, on all ranks.
+  const std::vector<int64_t>& rows() const { return row_; }
   /// Its points, on rank 0, of this rank's slab of positions. Collective.
   std::vector<Vec3> points_at(const std::vector<Vec3>& slab) const;
 
  private:
   MPI_Comm comm_;
   surface::Surface initial_;
-  std::vector<int64_t> row_;     // [points] of the model, ascending, on all ranks
+  std::vector<int64_t> row_;     // [points]
   std::vector<char> on_a_side_;  // [points] it is on a side of a cut that contact keeps apart
 };
 

@@ -67,7 +67,6 @@ class Service {
   void write(const Request& request, Reply& reply);
   template <class Row>
   std::vector<Row> visible(const std::vector<Row>& rows) const;
-  void find_visible();
   std::vector<std::pair<int64_t, Vec3>> functional(const Request& request) const;
   nlohmann::json write_gradient(const solve::Gradient& gradient) const;
   void add_arrays(const PlanSession::Answer& answer, bool all, Reply& reply) const;
@@ -77,7 +76,6 @@ class Service {
   std::unique_ptr<PlanSession> session_;
   Requests* requests_ = nullptr;  // of the channel that is answered, …
   int output_ = -1;               // … and where its answers go
-  std::vector<int64_t> skin_;     // rows of the points of the skin, on rank 0
 };
 
 /// Returns whether the answer could be sent. Errors are the same on all ranks, as the lines are.
@@ -113,22 +111,13 @@ void Service::dispatch(const Request& request, Reply& reply) {
 /// Builds the scene with changes in place of those before. Where it cannot be, it stays as it is.
 void Service::change(const scene::SceneChanges& changes) {
   session_ = std::make_unique<PlanSession>(comm_, scene_, changes);
-  skin_.clear();
-}
-
-/// The skin's points: those of layer 0 that its triangles have.
-void Service::find_visible() {
-  if (!skin_.empty()) return;
-  for (const auto& triangle : session_->model().skin)
-    skin_.insert(skin_.end(), triangle.begin(), triangle.end());
-  base::sort_unique(skin_);
 }
 
 template <class Row>
 std::vector<Row> Service::visible(const std::vector<Row>& rows) const {
   std::vector<Row> picked;
   if (rows.empty()) return picked;
-  for (const int64_t row : skin_) picked.push_back(rows[row]);
+  for (const int64_t row : session_->skin_rows()) picked.push_back(rows[row]);
   return picked;
 }
 
@@ -150,7 +139,6 @@ void add_given_skin(const surface::Surface& given, const surface::Surface& skin,
 }
 
 void Service::describe(Reply& reply) {
-  find_visible();
   json& head = reply.head();
   head["accuracy"] = session_->accuracy();
   head["box"] = {{"translate", write_vector(session_->box().translate)},
@@ -161,19 +149,13 @@ void Service::describe(Reply& reply) {
                               {"centroid", write_vector(piece.centroid)},
                               {"translate", write_vector(piece.scenes.translation)},
                               {"rotate", write_vector(piece.scenes.rotation)}});
-  const std::vector<Vec3> initial = session_->initial();
   if (base::rank(comm_) > 0) return;
   const model::Model& model = session_->model();
-  head["points"] = initial.size();
+  head["points"] = session_->points();
   for (int row = 0; row < 3; ++row) head["axes"].push_back(write_vector(session_->axes().row(row)));
   head["bones"] = model.bones;
   head["cuts"] = session_->has_cuts();
-  surface::Surface skin{"skin", visible(initial), {}};
-  for (const auto& triangle : model.skin) {
-    Triangle& corners = skin.triangles.emplace_back();
-    for (int k = 0; k < 3; ++k)
-      corners[k] = std::ranges::lower_bound(skin_, triangle[k]) - skin_.begin();
-  }
+  const surface::Surface& skin = session_->skin();
   reply.add("position", skin.points);
   reply.add("triangles", skin.triangles);
   if (session_->given_skin()) add_given_skin(*session_->given_skin(), skin, reply);
@@ -201,7 +183,7 @@ PlanSession::Placements Service::place(const PlanMoves& plan) const {
 
 /// Weights by rows of the model. On rank 0.
 std::vector<std::pair<int64_t, Vec3>> Service::functional(const Request& request) const {
-  const std::vector<int64_t>& rows = skin_;
+  const std::vector<int64_t>& rows = session_->skin_rows();
   const auto count = request.all_points ? session_->points() : static_cast<int64_t>(rows.size());
   std::vector<std::pair<int64_t, Vec3>> functional;
   for (const auto& [point, weight] : request.gradient_of) {
@@ -266,7 +248,6 @@ void Service::write(const Request& request, Reply& reply) {
 }
 
 void Service::solve(const Request& request, Reply& reply) {
-  find_visible();
   PlanSession::Request requested;
   requested.plan = place(request.plan.value_or(PlanMoves()));
   requested.accuracy = request.accuracy.value_or(session_->accuracy());

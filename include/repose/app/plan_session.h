@@ -62,8 +62,10 @@ class PlanSession {
   const surface::Surface* given_skin() const;  ///< in whose place another is solved, or null
   bool has_cuts() const;                       ///< incisions or parted lips
   Mat3 axes() const;                           ///< rows: left, back and up of the head in the scan
-  std::vector<Vec3> initial() const;           ///< [N] mm
-  int64_t points() const;                      ///< N, on all ranks
+  const surface::Surface& skin() const;        ///< that is solved, before anything moves
+  /// Rows of the skin's points in the model, ascending, on all ranks.
+  const std::vector<int64_t>& skin_rows() const;
+  int64_t points() const;  ///< N, on all ranks
 
   /// Throws InputError where the plan is outside the box.
   Answer solve(const Request& request);
