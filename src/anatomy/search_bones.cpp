@@ -82,9 +82,8 @@ void search_chin(const std::vector<ProfilePoint>& profile, double aside, Search&
              "no bone between pogonion and the lower incisors", aside);
 }
 
-/// Menton: the middle of what lies less than 1 mm above the lowest point of a profile at x =
-/// `aside` that is seen from below. In front the lowest row of cells lies anywhere on a flat lower
-/// border.
+/// Returns menton: the middle of the points less than 1 mm above the lowest one of a profile at x =
+/// `aside`, seen from below. In front the lowest row of cells lies anywhere on a flat lower border.
 std::optional<ProfilePoint> menton_of(const Mandible& mandible, double aside,
                                       const HeadFrame& frame) {
   constexpr double flat = 1;  // mm

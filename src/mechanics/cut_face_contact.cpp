@@ -213,7 +213,7 @@ std::pair<Patch, bool> nearest_foot(const std::vector<Eigen::Vector2d>& starts,
   for (const Eigen::Vector2d& start : starts) {
     auto found = nearest_place(start, maximum, at, evaluate);
     const double there = (at - found.first.point).norm();
-    if (there < distance) std::tie(nearest, distance) = std::pair(std::move(found), there);
+    if (!(there >= distance)) std::tie(nearest, distance) = std::pair(std::move(found), there);
   }
   return nearest;
 }
@@ -267,6 +267,7 @@ std::vector<Eigen::Vector2d> CutFaceContact::Samples::near(const Vec3& at) const
     if (square[sample] <= largest && is_least(sample))
       found.push_back(step * Eigen::Vector2d(sample / rows, sample % rows) -
                       Eigen::Vector2d::Ones());
+  if (found.empty()) found.push_back({0, 0});  // at positions that are not finite
   return found;
 }
 

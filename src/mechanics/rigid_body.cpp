@@ -106,7 +106,7 @@ struct Region {
 };
 
 /// Branch and bound: a distance changes by no more than the way. Ends after `most` regions: few
-/// find the depth of a plate, and only the proof that it is nowhere deeper takes more.
+/// find the depth of a plate, and only the proof that no point is deeper takes more.
 double deepest_in(const surface::DistanceField& field, double at_most) {
   constexpr int most = 1 << 16;
   constexpr double near = 1.02;  // times the depth
