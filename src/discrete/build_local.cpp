@@ -1,7 +1,8 @@
 #include <algorithm>
 #include <map>
+#include <numeric>
 
-#include "by_column.h"
+#include "exchange.h"
 #include "piece.h"
 #include "rank_columns.h"
 #include "repose/base/agreement.h"
@@ -16,6 +17,51 @@ namespace {
 
 using base::pick;
 using model::PointSet;
+
+/// Rows in a list of the whole model that is sorted by column.
+struct ColumnRows {
+  std::vector<int64_t> row;
+  int64_t total = 0;
+};
+
+/// [columns] on rank 0 the values of all ranks' own columns; collective.
+template <class Value>
+std::vector<Value> gather_by_column(MPI_Comm comm, int64_t columns, const std::vector<int64_t>& own,
+                                    const std::vector<Value>& values) {
+  const std::vector<int64_t> column = base::gather(comm, own);
+  const std::vector<Value> value = base::gather(comm, values);
+  std::vector<Value> all(base::rank(comm) == 0 ? columns : 0);
+  for (size_t k = 0; k < column.size(); ++k) all[column[k]] = value[k];
+  return all;
+}
+
+/// Returns the global rows of items; `column` [items] is ascending. The items of a column count on
+/// one rank, where they are `owned` [items], and may be known on others. O(all columns) on rank 0.
+/// Collective.
+ColumnRows rows_by_column(MPI_Comm comm, int64_t columns, const std::vector<int64_t>& column,
+                          const std::vector<char>& owned) {
+  std::vector<int64_t> known, own, count;
+  for (size_t i = 0; i < column.size(); ++i) {
+    const int64_t c = column[i];
+    if (known.empty() || known.back() != c) known.push_back(c);
+    if (!owned[i]) continue;
+    if (own.empty() || own.back() != c) own.push_back(c), count.push_back(0);
+    ++count.back();
+  }
+  std::vector<int64_t> first = gather_by_column(comm, columns + 1, own, count);
+  if (base::rank(comm) == 0) std::exclusive_scan(first.begin(), first.end(), first.begin(), 0L);
+  const std::vector<int64_t> begin = Exchange::fetch(comm, known, std::ssize(first))(first);
+  ColumnRows rows;
+  if (base::rank(comm) == 0) rows.total = first.back();
+  base::broadcast(comm, rows.total);
+  size_t k = 0;
+  int64_t next = 0;
+  for (const int64_t c : column) {
+    if (known[k] != c) ++k, next = 0;
+    rows.row.push_back(begin[k] + next++);
+  }
+  return rows;
+}
 
 /// The model of a rank's piece; refuses regions that hold no prism of any.
 /// Collective.

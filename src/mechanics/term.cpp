@@ -5,12 +5,22 @@
 #include <map>
 
 #include "adhesion.h"
-#include "elastic_support.h"
 #include "repose/base/error.h"
 
 namespace repose::mechanics {
 
 namespace {
+
+/// Elastic support of a point of tissue by a bone: a spring of no rest length between the point and
+/// its initial place on the bone (docs/theory/load_path.md). Numbers: the place, mm; the stiffness,
+/// N/mm; the row of the bone.
+struct ElasticSupport {
+  static constexpr int points = 1, numbers = 5;
+  template <class Number>
+  static Number energy(const Corners<Number, points>& x, std::span<const double> n) {
+    return n[3] / 2 * (x[0] - Vec3(n[0], n[1], n[2]).cast<Number>()).squaredNorm();
+  }
+};
 
 std::map<std::string, std::unique_ptr<const Term>>& known_terms() {
   static std::map<std::string, std::unique_ptr<const Term>> terms = [] {

@@ -2,10 +2,10 @@
 #include <string>
 #include <vector>
 
+#include "bone_field.h"
 #include "motion_range.h"
 #include "repose/model/skin_mesh.h"
 #include "repose/scene/scene.h"
-#include "repose/surface/surface.h"
 
 namespace repose::model {
 
@@ -18,5 +18,12 @@ namespace repose::model {
 std::vector<std::string> check_anatomy(const scene::Scene& scene, const MotionRange& range,
                                        const SkinMesh& mesh,
                                        const std::vector<surface::Surface>& bones);
+
+/// One line about a skin whose outermost border lies within 15 mm of a bone that moves, before or
+/// after its motion: how near, where, the effect on the face, and the remedy. Empty if there is no
+/// such place. The measured effect is that of docs/guide/scene.md, "The border of the skin".
+std::string describe_near_border(const scene::Scene& scene, const MotionRange& range,
+                                 const std::vector<surface::Surface>& bones, const SkinMesh& mesh,
+                                 const BoneField& field);
 
 }  // namespace repose::model

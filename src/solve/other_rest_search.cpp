@@ -1,5 +1,7 @@
 #include "other_rest_search.h"
 
+#include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -12,7 +14,56 @@ namespace repose::solve {
 
 using base::check;
 
+/// A point that presses on a body near an edge, and the gap that it would have from the side round
+/// the edge.
+struct OtherSide {
+  mechanics::LinearGap gap;  ///< of this rank
+  /// By how much softer than its neighborhood held still the point would have to be for the other
+  /// side to have as much energy.
+  double softness;
+};
+
 namespace {
+
+/// [local points] Blocks on the diagonal of the semidefinite Hessian without contact. Collective.
+std::vector<Mat3> diagonal_blocks(discrete::Tangent& tangent, Vec displacement, size_t points) {
+  std::vector<Mat3> blocks(points, Mat3::Zero());
+  tangent.assemble(displacement);
+  tangent.visit_spd_blocks([&](int32_t p, int32_t q, const Mat3& block) {
+    if (p == q) blocks[p] += block;
+  });
+  return blocks;
+}
+
+/// Let go, a point with compliance s C and the contact's force f moves by −s C f and has ½ s fᵀCf
+/// less energy; to stay outside the other plane, of gap g and normal m, it must have
+/// ½ (s mᵀCf − g)² / (s mᵀCm) more. Returns the s at which they are equal.
+double softness(const mechanics::LinearGap& other, const Mat3& compliance, const Vec3& force) {
+  const Vec3& m = other.gradient.front().second;
+  const Vec3 moved = compliance * force;
+  const double reach = std::sqrt(force.dot(moved) * m.dot(compliance * m)) - m.dot(moved);
+  return -other.gap / reach;
+}
+
+/// Returns the sides, of this rank's points, that may have less energy than those pressed on at
+/// `displacement`, where the objective was updated last: in a model of one point, whose compliance
+/// is a few times the inverse of its block of the Hessian. Softness ascends. Collective.
+std::vector<OtherSide> promising_sides(discrete::Objective& objective, discrete::Tangent& tangent,
+                                       Vec displacement) {
+  constexpr double softest = 4;
+  const mechanics::BodyContact& contact = objective.contact().bodies();
+  const auto position = objective.positions().local();
+  const std::vector<Mat3> blocks = diagonal_blocks(tangent, displacement, position.size());
+  std::vector<OtherSide> found;
+  for (mechanics::LinearGap& gap : contact.other_sides(position)) {
+    const size_t c = gap.constraint;
+    const Vec3 force = contact.multipliers()[c] * gap.area * contact.normal(c);
+    const double s = softness(gap, blocks[gap.gradient.front().first].inverse(), force);
+    if (s > 0 && s < softest) found.push_back({std::move(gap), s});
+  }
+  std::ranges::sort(found, {}, &OtherSide::softness);
+  return found;
+}
 
 /// Returns true if an energy is less than that of the rest position so far, by more than rounding.
 bool is_less(double value, double value_here) {

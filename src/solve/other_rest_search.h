@@ -5,9 +5,10 @@
 #include <vector>
 
 #include "contact_descent.h"
-#include "contact_sides.h"
 
 namespace repose::solve {
+
+struct OtherSide;
 
 /// Finds other rest positions of tissue that presses or slides on bodies near edges of these
 /// (docs/theory/contact.md): by programs without rounded bodies from the prediction, and from where
