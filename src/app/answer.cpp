@@ -3,13 +3,12 @@
 #include <algorithm>
 #include <limits>
 
-#include "bone_through_skin.h"
 #include "movement.h"
-#include "moving_border.h"
 #include "report.h"
 #include "repose/base/collective.h"
 #include "repose/scene/landmark_names.h"
 #include "repose/solve/supported.h"
+#include "skin_checks.h"
 
 namespace repose::app {
 

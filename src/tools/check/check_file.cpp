@@ -3,9 +3,7 @@
 #include <algorithm>
 #include <limits>
 
-#include "check_adhesion.h"
 #include "check_contact.h"
-#include "check_supports.h"
 #include "recompute.h"
 #include "repose/base/error.h"
 #include "repose/model/motion.h"

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "check_supports.h"
+#include "check_terms.h"
 #include "repose/mechanics/spring_law.h"
 #include "repose/mechanics/stress.h"
 #include "repose/mechanics/term.h"

@@ -1,7 +1,7 @@
 #pragma once
 #include <vector>
 
-#include "check_adhesion.h"
+#include "check_terms.h"
 #include "repose/model/model.h"
 #include "repose/model/step.h"
 

@@ -1,4 +1,4 @@
-#include "app/bone_through_skin.h"
+#include "app/skin_checks.h"
 
 #include <gtest/gtest.h>
 

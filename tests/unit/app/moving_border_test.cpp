@@ -1,4 +1,4 @@
-#include "app/moving_border.h"
+#include "app/skin_checks.h"
 
 #include <gtest/gtest.h>
 

@@ -39,4 +39,13 @@ std::vector<PointForce> evaluate(const model::Model& model, const std::vector<Fi
                                  const model::PrescribedMotion& motion, double load,
                                  const std::vector<Vec3>& position);
 
+/// Evaluates a model's elastic supports, from their numbers alone, at a load and the positions of
+/// all points (mm).
+std::vector<PointForce> evaluate_supports(const model::Model& model,
+                                          const model::PrescribedMotion& motion, double load,
+                                          const std::vector<Vec3>& position);
+
+/// States whether elastic supports hold points of soft tissue where these begin.
+void check_supports(const model::Model& model, Comparison& comparison);
+
 }  // namespace repose::tools::check

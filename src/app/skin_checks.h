@@ -13,4 +13,9 @@ namespace repose::app {
 std::string describe_bone_through_skin(const surface::Surface& initial,
                                        const std::vector<Vec3>& now, const model::Model& model);
 
+/// Row of the closing table on the longest border of the skin that is solved, where its points,
+/// `now`, have moved by a millimeter or more: what lies beyond is not in the model. Empty where
+/// they have not. Throws what make_skin_mesh() throws.
+std::string describe_moving_border(const surface::Surface& initial, const std::vector<Vec3>& now);
+
 }  // namespace repose::app
