@@ -36,7 +36,6 @@ std::vector<double> depths_of(const Model& model) {
   return depths;
 }
 
-/// A place on the skin of a model.
 struct Place {
   Triangle column;  // of the model
   Vec3 weight;      // of each, sum 1

@@ -14,7 +14,6 @@ namespace {
 
 using scene::find;
 
-/// The frame of the head at the mouth.
 HeadFrame frame_of(const scene::AnatomyPlan& plan) {
   HeadFrame frame;
   frame.axes = plan.axes;

@@ -220,7 +220,6 @@ void bound(const FrontMap& skin, LipCrease& crease) {
   points.insert(points.end(), on_the_left.begin(), on_the_left.end());
 }
 
-/// The crease between lips that touch.
 LipCrease follow_touching(const FrontMap& skin, double z, const std::optional<Vec3>& right,
                           const std::optional<Vec3>& left) {
   const auto middle = deepest(skin, 0, z, arm);

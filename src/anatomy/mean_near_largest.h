@@ -5,7 +5,6 @@
 
 namespace repose::anatomy {
 
-/// The largest value of items.
 template <class Items, class Value>
 double largest_of(const Items& items, Value&& value) {
   double largest = -INFINITY;

@@ -73,7 +73,6 @@ struct Mandible {
   ScanEnd end;
 };
 
-/// Finds the landmarks of bone.
 void search_bones(const surface::Surface& skull, const Mandible& mandible, Search& search);
 /// Finds the landmarks of skin, after those of bone.
 void search_skin(const surface::Surface& skin, Search& search);

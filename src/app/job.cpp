@@ -73,7 +73,6 @@ void take_report(const model::ColumnGeometry& geometry, int ranks, Job& job) {
   job.warnings = std::move(report.warnings);
 }
 
-/// Describes the cuts that a model has, from number `first` on.
 std::string describe_cuts(const model::ColumnGeometry& geometry, size_t first) {
   std::vector<int64_t> doubled(geometry.cuts().size(), 0);
   for (const model::DoubledColumn& at : geometry.doubled()) doubled[at.cut] += at.points;

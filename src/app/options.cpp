@@ -45,7 +45,6 @@ std::vector<base::Option> method_options() {
           from_key("load_steps", "solve.load_steps")};
 }
 
-/// On which models.
 std::vector<base::Option> model_options() {
   return {
       {.name = "profile",

@@ -27,7 +27,6 @@ constexpr const char* names =
     "noshared nox objects_dump popen_machine python skip_petscrc start_in_debugger "
     "stop_for_debugger use_gpu_aware_mpi version x_virtual";
 
-/// Returns whether one of the words satisfies the predicate.
 template <class Predicate>
 bool any_word(const char* words, Predicate&& satisfies) {
   std::istringstream stream(words);

@@ -87,7 +87,6 @@ void remove_empty_terms(MPI_Comm comm, model::Model& model) {
     if (elements[k] == 0) model.elements.erase(model.elements.begin() + static_cast<int64_t>(k));
 }
 
-/// Rows of the piece's columns that a rank owns.
 std::vector<int64_t> own_columns(const RankColumns& rank_columns, int rank) {
   std::vector<int64_t> own;
   for (size_t c = 0; c < rank_columns.owner.size(); ++c)

@@ -166,7 +166,6 @@ model::TermElements pick_elements(const Piece& piece, const model::TermElements&
   return mine;
 }
 
-/// Rows of the piece's points that a rank owns, by their places.
 std::vector<int64_t> own_points(const Piece& piece, int rank) {
   std::vector<int64_t> rows;
   for (size_t i = 0; i < piece.owner.size(); ++i)

@@ -11,7 +11,6 @@ namespace {
 
 constexpr int32_t none = -1;
 
-/// The column (of those of this rank) of each own point.
 std::vector<int32_t> columns_of_points(const ColumnLevel& level) {
   std::vector<int32_t> column(level.own());
   for (size_t c = 0; c + 1 < level.columns().size(); ++c)

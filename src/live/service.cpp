@@ -228,7 +228,6 @@ void Service::add_arrays(const PlanSession::Answer& answer, bool all, Reply& rep
   }
 }
 
-/// The plan of the scene's moves.
 PlanSession::Placements Service::scenes_plan() const {
   PlanSession::Placements plan;
   for (const PlanSession::Piece& piece : session_->pieces()) plan.push_back(piece.scenes);

@@ -71,7 +71,6 @@ EdgeLoop make_edge_loop(const model::Model& part, int64_t owned, bool soft) {
   return loop;
 }
 
-/// Sets the material of a solid's prisms, in the order of the loop.
 void set_material(const model::Prisms& prisms, PrismLoop& loop) {
   loop.shear_modulus.clear();
   loop.nodal_modulus.clear();

@@ -11,7 +11,6 @@ inline bool adheres(const scene::Scene& scene) {
   return scene.anatomy && scene.anatomy->vestibule && scene.anatomy->adhesion > 0;
 }
 
-/// Returns the jaws that lips adhere to.
 std::vector<AdheringJaw> adhering_jaws(const scene::AnatomyPlan& plan, const ColumnLayout& layout);
 
 /// Returns the rule by which the elements of add_adhesion() are made, without columns of cuts.

@@ -14,7 +14,6 @@ namespace {
 constexpr double attached_within = 1.5;            // mm
 constexpr double attached_within_per_depth = 0.5;  // of the column's thickness
 
-/// Returns the requested attachment of each column, by region.
 std::vector<scene::Attach> requested_attachments(const Columns& columns, const scene::Scene& scene,
                                                  Attachment& attachment) {
   const scene::Tissue& tissue = scene.tissue;

@@ -41,7 +41,6 @@ Vec3 middle_of(const std::array<Vec3, 6>& corners) {
   return std::accumulate(corners.begin(), corners.end(), Vec3(Vec3::Zero())) / 6;
 }
 
-/// The means of the moduli of strata by their shares.
 Moduli mean_moduli(const std::vector<Moduli>& strata, const std::vector<double>& share) {
   Moduli mean{0, 0};
   for (size_t s = 0; s < share.size(); ++s) {

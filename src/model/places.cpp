@@ -6,7 +6,6 @@
 namespace repose::model {
 namespace {
 
-/// The vertices in connected groups.
 std::vector<std::vector<int64_t>> groups_of(const SkinMesh& mesh,
                                             const std::vector<int64_t>& vertices) {
   std::vector<char> open(mesh.points.size(), 0);

@@ -35,7 +35,6 @@ class Reader {
   const std::string& file() const { return name_; }
   /// Returns whether something of that path is there, at the end of links that lead somewhere.
   bool has(const std::string& path) const;
-  /// Returns the number of links of a group.
   int64_t links(const std::string& group) const;
   template <class... Args>
   [[noreturn]] void refuse(const std::string& path, fmt::format_string<Args...> what,
@@ -54,7 +53,6 @@ class Reader {
   std::vector<Int> integers(const std::string& path, int64_t rows) const {
     return narrow<Int>(path, whole_numbers(path, {rows, {}}));
   }
-  /// Rows of K indices.
   template <size_t K>
   std::vector<std::array<int64_t, K>> tuples(const std::string& path, int64_t rows) const {
     const std::vector<int64_t> flat = whole_numbers(path, {rows, {static_cast<int64_t>(K)}});

@@ -65,7 +65,6 @@ class Numbers {
       else
         list.insert(list.end(), row.data(), row.data() + row.size());
   }
-  /// Adds the arrays of a group of the file.
   template <class Arrays>
   void add_group(const std::string& name, const Arrays& arrays) {
     model::for_each_array(arrays, [&](const char* array, const auto& rows) {

@@ -87,7 +87,6 @@ void write_array_of(hid_t data, hid_t begin, const Blocks& blocks, const XdmfArr
   write_virtual(data, array.title(), pieces_of(blocks, array, stored), shape);
 }
 
-/// The arrays at the points or at the cells of any part.
 void write_arrays(hid_t root, hid_t steps, const Blocks& blocks, bool at_points, size_t count) {
   const std::string place = at_points ? "PointData" : "CellData";
   const base::Hdf5Group data = base::create_hdf5_group(root, place.c_str());

@@ -86,7 +86,6 @@ std::string collection(const std::string& name, const char* kind, const std::str
       escaped(name), kind, grids);
 }
 
-/// The load steps of a block.
 std::string over_time(const XdmfBlock& block, const std::string& h5,
                       const std::vector<double>& loads) {
   std::string text;

@@ -62,7 +62,6 @@ Keys surface_keys() {
   return joined({skin, volume_keys("skin"), bones, volume_keys("bones[]")});
 }
 
-/// Keys of the attachment of tissue to bone.
 Keys attach_keys() {
   return {one_of("tissue.released", "contact", {"fixed", "slide", "contact", "free"},
                  "What such tissue does then: as attach."),

@@ -35,7 +35,6 @@ std::array<Vec3, 2> read_box(const Value& value) {
   return {Vec3(n[0], n[1], n[2]), Vec3(n[3], n[4], n[5])};
 }
 
-/// A surface from a volume; `map` has the key volume.
 SurfaceEntry read_volume_entry(const Map& map) {
   const auto path = map.find("volume")->file_or_folder();
   VolumeEntry entry;

@@ -21,7 +21,6 @@ class ContactSearch : public RestSearch {
                 linear::TangentSolver& solver, Minimizer& minimizer, Minimizer::Watch watch);
   /// Sets if find_other() searches (the default).
   void enable_other_rest(bool enabled) { finds_other_ = enabled; }
-  /// Returns the evaluations of find_other().
   int64_t evaluations_for_other() const { return other_.evaluations(); }
   std::optional<bool> predict(Vec displacement, double load, Vec increment) override;
   Outcome run(Vec displacement, double accuracy) override;

@@ -295,7 +295,6 @@ void OtherRestSearch::find(Vec displacement, double accuracy, Outcome& outcome) 
   evaluations_ += objective_.evaluations() - evaluated;
 }
 
-/// Keeps the farther of two other rest positions.
 void OtherRestSearch::keep_farther(OtherRest other, Outcome& outcome) {
   if (!outcome.other || outcome.other->distance < other.distance) outcome.other = std::move(other);
 }

@@ -71,7 +71,6 @@ Sample deepest_along(std::span<const Vec3> points, const Rows& rows, const Sampl
   return deepest;
 }
 
-/// The deepest layer of all ranks.
 int32_t deepest_layer(MPI_Comm comm, const discrete::Part& part) {
   int32_t deepest = 0;
   for (const int32_t layer : part.model.points.layer) deepest = std::max(deepest, layer);
@@ -89,7 +88,6 @@ std::vector<Rows> deepest_segments(const discrete::Part& part, int32_t last) {
   return segments;
 }
 
-/// Owned columns that have free points.
 std::vector<Rows> free_columns(const discrete::Part& part) {
   const model::Points& points = part.model.points;
   std::vector<Rows> columns;
@@ -114,7 +112,6 @@ void combine(MPI_Comm comm, PiercedColumns& found) {
   found.depth = base::max_over_ranks_with(comm, found.depth, found.body, found.where);
 }
 
-/// Takes a sample in a body as the deepest where it is.
 void take(const Sample& sample, size_t body, PiercedColumns& found) {
   if (sample.depth <= found.depth) return;
   found.body = static_cast<int32_t>(body);

@@ -8,7 +8,6 @@ namespace repose::tools::decimation {
 
 using surface::Corners;
 
-/// Returns whether the longest edge of a triangle is longer than `length`.
 bool longer(const Corners& triangle, double length);
 
 /// A convex flat piece of a triangle, as proofs about distances cut them.

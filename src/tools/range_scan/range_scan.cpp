@@ -58,7 +58,6 @@ std::vector<Triangle> all_triangles(const RangeGrid& grid, const std::vector<Vec
   return triangles;
 }
 
-/// The unit vector from a triangle to the scanner.
 Vec3 to_scanner(const std::vector<Vec3>& points, const Triangle& t, bool cylinder) {
   if (!cylinder) return Vec3::UnitZ();
   Vec3 middle = points[t[0]] + points[t[1]] + points[t[2]];
