@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
+#include <tuple>
 #include <utility>
 
 #include "repose/base/collective.h"
@@ -91,14 +93,16 @@ void Contact::set_stiffness(double stiffness) {
 
 ContactPressures Contact::multipliers() const {
   const auto p = bodies_.multipliers(), q = cut_faces_.multipliers();
-  return {{p.begin(), p.end()}, {q.begin(), q.end()}};
+  ContactPressures all(p.begin(), p.end());
+  all.insert(all.end(), q.begin(), q.end());
+  return all;
 }
 
 void Contact::set_multipliers(ContactPressures to) {
-  to.bodies.resize(bodies_.multipliers().size(), 0.0);
-  to.cut_faces.resize(cut_faces_.size(), 0.0);
-  bodies_.set_multipliers(to.bodies);
-  cut_faces_.set_multipliers(to.cut_faces);
+  const size_t touching = bodies_.multipliers().size();
+  to.resize(size(), 0.0);
+  bodies_.set_multipliers(std::span(to).first(touching));
+  cut_faces_.set_multipliers(std::span(to).subspan(touching));
 }
 
 void Contact::update_gaps() {
@@ -108,10 +112,50 @@ void Contact::update_gaps() {
 
 ContactPressures Contact::pressures() const {
   ContactPressures now;
-  for (size_t c = 0; c < bodies_.multipliers().size(); ++c)
-    now.bodies.push_back(bodies_.pressure(c));
-  for (size_t w = 0; w < cut_faces_.size(); ++w) now.cut_faces.push_back(cut_faces_.pressure(w));
+  for (size_t c = 0; c < bodies_.multipliers().size(); ++c) now.push_back(bodies_.pressure(c));
+  for (size_t w = 0; w < cut_faces_.size(); ++w) now.push_back(cut_faces_.pressure(w));
   return now;
+}
+
+std::vector<double> Contact::gaps() const {
+  std::vector<double> now(bodies_.gaps().begin(), bodies_.gaps().end());
+  for (size_t w = 0; w < cut_faces_.size(); ++w) now.push_back(cut_faces_.gap(w));
+  return now;
+}
+
+void Contact::set_pressures(const std::vector<double>& pressure) {
+  std::vector<double> minimum(pressure.size(), std::numeric_limits<double>::infinity());
+  std::vector<double*> nearest(pressure.size(), nullptr);
+  const size_t touching = bodies_.multipliers().size();
+  ContactPressures multiplier(size(), 0.0);
+  cut_faces_.update_gaps(positions_.local());
+  for (size_t c = 0; c < multiplier.size(); ++c) {
+    const bool touches = c < touching;
+    const int64_t point = touches ? bodies_.pairs().point[c] : cut_faces_.point(c - touching);
+    if (pressure[point] == 0) continue;
+    const double gap =
+        touches ? bodies_.measure_gap(c, positions_.local()) : cut_faces_.gap(c - touching);
+    if (gap < minimum[point])
+      std::tie(minimum[point], nearest[point]) = std::pair(gap, &multiplier[c]);
+  }
+  for (size_t i = 0; i < pressure.size(); ++i)
+    if (nearest[i]) *nearest[i] = pressure[i];
+  set_multipliers(std::move(multiplier));
+}
+
+double Contact::violation() {
+  update_gaps();
+  const ContactPressures now = pressures(), before = multipliers();
+  double maximum = 0;
+  for (size_t c = 0; c < now.size(); ++c) maximum = std::max(maximum, std::abs(now[c] - before[c]));
+  return base::max_over_ranks(positions_.comm(), maximum / stiffness());
+}
+
+double Contact::penetration() {
+  update_gaps();
+  double deepest = 0;
+  for (const double gap : gaps()) deepest = std::max(deepest, -gap);
+  return base::max_over_ranks(positions_.comm(), deepest);
 }
 
 void Contact::place_bodies() {

@@ -16,12 +16,10 @@ constexpr double contact_safety = 2;  // the estimate is so many times what is l
 }  // namespace
 
 ContactDescent::ContactDescent(discrete::Objective& objective, discrete::Tangent& tangent,
-                               Minimizer& minimizer, ContactPenalty& penalty,
-                               ContactPrograms& programs)
+                               Minimizer& minimizer, ContactPrograms& programs)
     : objective_(objective),
       tangent_(tangent),
       minimizer_(minimizer),
-      penalty_(penalty),
       programs_(programs),
       stiffness_(objective_.positions().part().model.contact.stiffness) {}
 
@@ -29,29 +27,31 @@ void ContactDescent::stiffen(int times) {
   times_ = times;
   stiffness_ = times * objective_.positions().part().model.contact.stiffness;
   programs_.set_stiffness(stiffness_);
-  penalty_.set_stiffness(stiffness_);
+  tangent_.change_contact().set_stiffness(stiffness_);
 }
 
 /// Softens the penalty, which lets points change sides a few at a time.
 void ContactDescent::soften() {
   constexpr double softened = 0.25;
-  penalty_.set_stiffness(softened * stiffness_);
+  tangent_.change_contact().set_stiffness(softened * stiffness_);
 }
 
 /// Takes the pressures of a soft search that ended at `displacement` as multipliers, at the full
 /// stiffness again.
 void ContactDescent::harden(Vec displacement) {
   objective_.positions().update(displacement);
-  penalty_.move_multipliers();
-  penalty_.set_stiffness(stiffness_);
+  discrete::Contact& contact = tangent_.change_contact();
+  contact.update_gaps();
+  contact.set_multipliers(contact.pressures());
+  contact.set_stiffness(stiffness_);
 }
 
 void ContactDescent::slacken(Vec displacement) {
   constexpr double slack = 0.01, roughly = 0.1;  // of the stiffness; mm
-  penalty_.set_multipliers({});
-  penalty_.set_stiffness(slack * stiffness_);
+  tangent_.change_contact().set_multipliers({});
+  tangent_.change_contact().set_stiffness(slack * stiffness_);
   minimizer_.presolve(displacement, roughly);
-  penalty_.set_stiffness(stiffness_);
+  tangent_.change_contact().set_stiffness(stiffness_);
 }
 
 ContactDescent::End ContactDescent::approach(Vec displacement, double accuracy,
@@ -63,8 +63,7 @@ ContactDescent::End ContactDescent::approach(Vec displacement, double accuracy,
   harden(displacement);
   iterations += near.iterations;
   const End end = near.stopped ? End::stopped : programs_.run(displacement, finely, iterations);
-  objective_.contact().round_edges(false);
-  tangent_.forget_contact();
+  tangent_.change_contact().round_edges(false);
   return end;
 }
 
@@ -73,7 +72,7 @@ Outcome ContactDescent::finish(Vec displacement, double accuracy) {
   Outcome outcome =
       minimizer_.finish(displacement, (1 - missed) * accuracy, programs_.take_last_step());
   objective_.positions().update(displacement);
-  outcome.displacement_error += contact_safety * penalty_.violation();
+  outcome.displacement_error += contact_safety * objective_.contact().violation();
   const MPI_Comm comm = objective_.positions().comm();
   const mechanics::BodyContact& contact = objective_.contact().bodies();
   outcome.overlapped = base::sum_over_ranks(comm, contact.count_released());
@@ -160,7 +159,7 @@ Outcome ContactDescent::settle(Vec displacement, double accuracy, int max_rounds
                                   : finish(displacement, accuracy);
     if (outcome.converged) break;
     if (!outcome.stable && leaves()) continue;
-    const double before = std::exchange(missing, penalty_.violation());
+    const double before = std::exchange(missing, objective_.contact().violation());
     if (missing > steady * before) {
       const bool leads = !std::exchange(led_out, true) && lead_out(displacement);
       if (leads || release_overlapped()) {

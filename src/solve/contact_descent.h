@@ -1,5 +1,4 @@
 #pragma once
-#include "contact_penalty.h"
 #include "contact_programs.h"
 
 namespace repose::solve {
@@ -11,7 +10,7 @@ class ContactDescent {
   using End = ContactPrograms::End;
   /// `minimizer` minimizes `objective`.
   ContactDescent(discrete::Objective& objective, discrete::Tangent& tangent, Minimizer& minimizer,
-                 ContactPenalty& penalty, ContactPrograms& programs);
+                 ContactPrograms& programs);
 
   /// Takes so many times the model's stiffness as that of the penalty.
   void stiffen(int times);
@@ -41,7 +40,6 @@ class ContactDescent {
   discrete::Objective& objective_;
   discrete::Tangent& tangent_;
   Minimizer& minimizer_;
-  ContactPenalty& penalty_;
   ContactPrograms& programs_;
   int times_ = 1;
   double stiffness_;  // N/mm³

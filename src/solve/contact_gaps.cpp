@@ -65,10 +65,8 @@ void ContactGaps::add_gaps() {
   cuts.update_gaps(objective_.positions().local());
   std::ranges::copy(cuts.linear_gaps(farthest), std::back_inserter(gaps_));
   state_.assign(gaps_.size(), {});
-  for (size_t k = 0; k < gaps_.size(); ++k) {
-    const auto from = k < touching_ ? bodies.multipliers() : cuts.multipliers();
-    state_[k].multiplier = from[gaps_[k].constraint];
-  }
+  const discrete::ContactPressures multipliers = objective_.contact().multipliers();
+  for (size_t k = 0; k < gaps_.size(); ++k) state_[k].multiplier = multipliers[constraint(k)];
   curvature_.clear(), convex_curvature_.clear();
   curvature_share_ = 1;
   const double scale = objective_.weights().elastic;
@@ -156,9 +154,8 @@ void ContactGaps::set_direction(Vec direction) {
   for (size_t k = 0; k < gaps_.size(); ++k) state_[k].closing = change(gaps_[k], moved_);
 }
 
-void ContactGaps::set_changes(std::span<const double> bodies, std::span<const double> cut_faces) {
-  for (size_t k = 0; k < gaps_.size(); ++k)
-    state_[k].closing = (k < touching_ ? bodies : cut_faces)[gaps_[k].constraint];
+void ContactGaps::set_changes(std::span<const double> changes) {
+  for (size_t k = 0; k < gaps_.size(); ++k) state_[k].closing = changes[constraint(k)];
 }
 
 double ContactGaps::line_search(double slope, double curvature) const {
@@ -211,11 +208,8 @@ void ContactGaps::set_multipliers(const std::vector<double>& to) {
 }
 
 void ContactGaps::give_multipliers() {
-  discrete::ContactPressures given{
-      std::vector<double>(objective_.contact().bodies().multipliers().size(), 0.0),
-      std::vector<double>(objective_.contact().cut_faces().size(), 0.0)};
-  for (size_t k = 0; k < gaps_.size(); ++k)
-    (k < touching_ ? given.bodies : given.cut_faces)[gaps_[k].constraint] = state_[k].multiplier;
+  discrete::ContactPressures given(objective_.contact().size(), 0.0);
+  for (size_t k = 0; k < gaps_.size(); ++k) given[constraint(k)] = state_[k].multiplier;
   objective_.contact().set_multipliers(std::move(given));
 }
 

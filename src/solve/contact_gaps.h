@@ -39,9 +39,8 @@ class ContactGaps {
   void add_forces(Vec to);
   /// Takes δ as the direction in which d changes next. Collective.
   void set_direction(Vec direction);
-  /// Takes changes of gaps, mm [constraints of bodies, of cut faces], in place of those by a
-  /// direction. Not collective.
-  void set_changes(std::span<const double> bodies, std::span<const double> cut_faces);
+  /// Takes changes of gaps, mm [constraints], in place of those by a direction. Not collective.
+  void set_changes(std::span<const double> changes);
   /// Adds the forces that the active gaps have by the change of d by the direction. Collective.
   void add_change_of_forces(Vec to);
   /// Returns the share of the direction that leads to the least value, of a function with `slope`
@@ -58,6 +57,11 @@ class ContactGaps {
 
  private:
   void add_gaps();
+  /// Row of a gap in discrete::ContactPressures.
+  size_t constraint(size_t k) const {
+    const size_t before = k < touching_ ? 0 : objective_.contact().bodies().gaps().size();
+    return before + gaps_[k].constraint;
+  }
   /// Pressure p − K (g + ∇g · d), N/mm², that acts where it is positive or the point slides.
   double pressure(size_t k) const {
     return state_[k].multiplier - stiffness_ * (gaps_[k].gap + state_[k].closed);

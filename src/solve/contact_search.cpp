@@ -11,21 +11,20 @@ ContactSearch::ContactSearch(discrete::Objective& objective, discrete::Tangent& 
                              Minimizer::Watch watch)
     : objective_(objective),
       tangent_(tangent),
-      penalty_(objective, tangent),
       programs_(objective, tangent, solver, std::move(watch)),
-      descent_(objective, tangent, minimizer, penalty_, programs_),
-      other_(objective, tangent, penalty_, programs_, descent_) {}
+      descent_(objective, tangent, minimizer, programs_),
+      other_(objective, tangent, programs_, descent_) {}
 
 std::optional<bool> ContactSearch::predict(Vec displacement, double load, Vec increment) {
   objective_.contact().bodies().restore_released();
-  const discrete::ContactPressures before = penalty_.multipliers();
+  const discrete::ContactPressures before = objective_.contact().multipliers();
   predicted_ = true;
   descent_.stiffen(1);
   const bool found = programs_.predict(displacement, load, increment);
   tangent_.forget_contact();
   if (!found) {
     objective_.contact().round_edges(false);
-    penalty_.set_multipliers(before);
+    tangent_.change_contact().set_multipliers(before);
   }
   return found;
 }
@@ -46,8 +45,8 @@ Outcome ContactSearch::run(Vec displacement, double accuracy) {
   outcome.iterations += iterations;
   if (outcome.stopped) return outcome;
   if (!outcome.converged && (outcome.stable || outcome.displacement_error > accuracy))
-    outcome.reason =
-        fmt::format("contact did not converge: {:.3g} mm of gaps remain", penalty_.violation());
+    outcome.reason = fmt::format("contact did not converge: {:.3g} mm of gaps remain",
+                                 objective_.contact().violation());
   return outcome;
 }
 
@@ -65,7 +64,7 @@ Outcome ContactSearch::run_near(Vec displacement, double accuracy) {
     outcome.iterations += iterations;
     if (outcome.converged) return outcome;
   }
-  penalty_.set_multipliers({});
+  tangent_.change_contact().set_multipliers({});
   check(VecCopy(guess, displacement));
   Outcome outcome = run(displacement, accuracy);
   outcome.iterations += iterations;

@@ -27,9 +27,11 @@ class ContactSearch : public RestSearch {
   /// By quadratic programs alone, as long as they serve.
   Outcome run_near(Vec displacement, double accuracy) override;
   void find_other(Vec displacement, double accuracy, Outcome& outcome) override;
-  discrete::ContactPressures pressures() const override { return penalty_.multipliers(); }
+  discrete::ContactPressures pressures() const override {
+    return objective_.contact().multipliers();
+  }
   void set_pressures(const discrete::ContactPressures& to) override {
-    penalty_.set_multipliers(to);
+    tangent_.change_contact().set_multipliers(to);
   }
 
  private:
@@ -37,7 +39,6 @@ class ContactSearch : public RestSearch {
 
   discrete::Objective& objective_;
   discrete::Tangent& tangent_;
-  ContactPenalty penalty_;
   ContactPrograms programs_;
   ContactDescent descent_;
   OtherRestSearch other_;

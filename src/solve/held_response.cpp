@@ -24,23 +24,19 @@ FrozenContact::FrozenContact(Problem& problem)
   contact.bodies().update_all_gaps(position);
   contact.cut_faces().update_gaps(position);
   const double stiff = stiffer * stiffness_;
-  const auto freeze = [&](double& pressure, double gap) {
-    pressure = pressure != 0 ? pressure + stiff * gap : stiff * (gap - apart);
-  };
   discrete::ContactPressures frozen = contact.pressures();
-  for (size_t c = 0; c < frozen.bodies.size(); ++c)
-    freeze(frozen.bodies[c], contact.bodies().gaps()[c]);
-  for (size_t w = 0; w < frozen.cut_faces.size(); ++w)
-    freeze(frozen.cut_faces[w], contact.cut_faces().gap(w));
+  const std::vector<double> gaps = contact.gaps();
+  for (size_t c = 0; c < frozen.size(); ++c)
+    frozen[c] = frozen[c] != 0 ? frozen[c] + stiff * gaps[c] : stiff * (gaps[c] - apart);
   set(stiff, frozen);
 }
 
 FrozenContact::~FrozenContact() { set(stiffness_, multipliers_); }
 
 void FrozenContact::set(double stiffness, const discrete::ContactPressures& multipliers) {
-  problem_.objective().contact().set_stiffness(stiffness);
-  problem_.objective().contact().set_multipliers(multipliers);
-  problem_.tangent().forget_contact();
+  discrete::Contact& contact = problem_.tangent().change_contact();
+  contact.set_stiffness(stiffness);
+  contact.set_multipliers(multipliers);
 }
 
 HeldResponse::HeldResponse(Problem& problem, Vec displacement)
@@ -57,9 +53,8 @@ HeldResponse::HeldResponse(Problem& problem, Vec displacement)
   solver_.refresh(displacement);
 }
 
-void HeldResponse::forces_of_gaps(std::span<const double> bodies, std::span<const double> cut_faces,
-                                  Vec forces) {
-  gaps_.set_changes(bodies, cut_faces);
+void HeldResponse::forces_of_gaps(std::span<const double> changes, Vec forces) {
+  gaps_.set_changes(changes);
   check(VecSet(forces, 0));
   gaps_.add_change_of_forces(forces);
 }

@@ -29,10 +29,9 @@ class HeldResponse {
  public:
   HeldResponse(Problem& problem, Vec displacement);  ///< collective
 
-  /// −K ∇gᵀ c, N, of changes c of the gaps of bodies and cut faces that the response is to undo, mm
-  /// [constraints]. Collective.
-  void forces_of_gaps(std::span<const double> bodies, std::span<const double> cut_faces,
-                      Vec forces);
+  /// −K ∇gᵀ c, N, of changes c of the gaps that the response is to undo, mm [constraints].
+  /// Collective.
+  void forces_of_gaps(std::span<const double> changes, Vec forces);
   /// Solves H x = load with ∇g · x = −c, of which load has the −K ∇gᵀ c in `forces`; 0 where that
   /// fails. `earlier` is the sum of the iterates before the last one: ∇g K (earlier + x) is what
   /// holds. Collective.

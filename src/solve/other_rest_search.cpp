@@ -74,18 +74,16 @@ bool is_less(double value, double value_here) {
 }  // namespace
 
 OtherRestSearch::OtherRestSearch(discrete::Objective& objective, discrete::Tangent& tangent,
-                                 ContactPenalty& penalty, ContactPrograms& programs,
-                                 ContactDescent& descent)
+                                 ContactPrograms& programs, ContactDescent& descent)
     : objective_(objective),
       tangent_(tangent),
-      penalty_(penalty),
       programs_(programs),
       descent_(descent),
       prediction_(objective.positions().make_vector()),
       start_(objective.positions().make_vector()) {}
 
 void OtherRestSearch::begin(Vec prediction) {
-  at_prediction_ = penalty_.multipliers();
+  at_prediction_ = objective_.contact().multipliers();
   check(VecCopy(prediction, prediction_));
 }
 
@@ -175,10 +173,11 @@ void OtherRestSearch::consider(Vec displacement, const discrete::ContactPressure
   }
   if (is_other && !less && end == End::reached && pierced(start_) == 0) {
     keep_farther(std::move(other), outcome);
-    candidates_.push_back({objective_.positions().make_vector(), penalty_.multipliers()});
+    candidates_.push_back(
+        {objective_.positions().make_vector(), objective_.contact().multipliers()});
     check(VecCopy(start_, candidates_.back().displacement));
   }
-  penalty_.set_multipliers(here);
+  tangent_.change_contact().set_multipliers(here);
 }
 
 /// Searches from `displacement` with one point beyond the other side of its body; ends in start_.
@@ -223,7 +222,7 @@ bool OtherRestSearch::change_sides(Vec displacement, double accuracy, std::set<s
   size_t next = 0;
   bool changed = false;
   for (int failed = 0; failed < max_failed; ++failed) {
-    const discrete::ContactPressures here = penalty_.multipliers();
+    const discrete::ContactPressures here = objective_.contact().multipliers();
     const double softness = next < sides.size() ? sides[next].softness : none;
     const auto first = base::extreme_over_ranks(positions.comm(), softness, MPI_MINLOC);
     if (first.value == none) break;
@@ -239,7 +238,7 @@ bool OtherRestSearch::change_sides(Vec displacement, double accuracy, std::set<s
       changed = true;
       failed = -1;
     } else {
-      penalty_.set_multipliers(here);
+      tangent_.change_contact().set_multipliers(here);
     }
     if (end == End::stopped) return false;
   }
@@ -260,8 +259,8 @@ bool OtherRestSearch::descend(Vec displacement, double accuracy, Outcome& outcom
 void OtherRestSearch::try_candidates(Vec displacement, double accuracy, Outcome& outcome) {
   constexpr double hardly = 0.015;  // of the energy
   for (const Candidate& candidate : std::exchange(candidates_, {})) {
-    const discrete::ContactPressures here = penalty_.multipliers();
-    penalty_.set_multipliers(candidate.pressures);
+    const discrete::ContactPressures here = objective_.contact().multipliers();
+    tangent_.change_contact().set_multipliers(candidate.pressures);
     check(VecCopy(candidate.displacement, start_));
     Outcome there;
     const double more = programs_.evaluate(start_) - outcome.objective;
@@ -271,7 +270,7 @@ void OtherRestSearch::try_candidates(Vec displacement, double accuracy, Outcome&
       check(VecCopy(candidate.displacement, start_));
       take_other(displacement, accuracy, std::move(there), outcome);
     } else {
-      penalty_.set_multipliers(here);
+      tangent_.change_contact().set_multipliers(here);
     }
   }
 }
@@ -282,9 +281,9 @@ void OtherRestSearch::find(Vec displacement, double accuracy, Outcome& outcome) 
   if (bodies.empty()) return;
   const int64_t evaluated = objective_.evaluations();
   for (const bool slack : {false, true}) {
-    const discrete::ContactPressures here = penalty_.multipliers();
+    const discrete::ContactPressures here = objective_.contact().multipliers();
     check(VecCopy(prediction_, start_));
-    penalty_.set_multipliers(at_prediction_);
+    tangent_.change_contact().set_multipliers(at_prediction_);
     if (slack) descent_.slacken(start_);
     consider(displacement, here, accuracy, outcome);
   }

@@ -17,7 +17,7 @@ struct OtherSide;
 class OtherRestSearch {
  public:
   OtherRestSearch(discrete::Objective& objective, discrete::Tangent& tangent,
-                  ContactPenalty& penalty, ContactPrograms& programs, ContactDescent& descent);
+                  ContactPrograms& programs, ContactDescent& descent);
 
   /// Keeps a prediction, with the multipliers there, as what programs start from.
   void begin(Vec prediction);
@@ -48,7 +48,6 @@ class OtherRestSearch {
 
   discrete::Objective& objective_;
   discrete::Tangent& tangent_;
-  ContactPenalty& penalty_;
   ContactPrograms& programs_;
   ContactDescent& descent_;
   int64_t evaluations_ = 0;

@@ -8,7 +8,6 @@
 #include <limits>
 #include <optional>
 
-#include "contact_penalty.h"
 #include "contact_search.h"
 #include "exact_penetration.h"
 #include "pierced_columns.h"
@@ -45,7 +44,7 @@ void measure(discrete::Objective& objective, model::StepNumbers& numbers) {
   numbers.volume_error_max = totals.volume_error_max;
   numbers.inverted_prisms = totals.inverted;
   if (objective.positions().part().contact) {
-    numbers.penetration = penetration(objective);
+    numbers.penetration = objective.contact().penetration();
     numbers.contact_energy = objective.contact_value();
   }
 }
@@ -346,7 +345,7 @@ void begin_near(const Start& start, const discrete::NaturalRows& natural, Vec gu
   positions.set_load(1);
   positions.update(guess);
   objective.contact().place_bodies();
-  set_pressures(objective, natural.owned(start.pressure));
+  objective.contact().set_pressures(natural.owned(start.pressure));
 }
 
 void end_stage(const Settings& settings, const char* name) {

@@ -21,8 +21,8 @@ constexpr double difference = 1e-6;  // mm or degrees
 
 /// Derivatives by a parameter with the points that are solved for at rest.
 struct Change {
-  std::vector<Vec3> travel;               // [local points] of fixed points, mm
-  std::vector<double> bodies, cut_faces;  // [constraints] of gaps, mm
+  std::vector<Vec3> travel;  // [local points] of fixed points, mm
+  std::vector<double> gaps;  // [constraints] mm
 };
 
 scene::Placement changed(scene::Placement placement, int component, double by) {
@@ -33,11 +33,7 @@ scene::Placement changed(scene::Placement placement, int component, double by) {
 /// Positions and gaps at the objective's latest evaluation.
 Change state_of(discrete::Objective& objective) {
   const auto position = objective.positions().local();
-  const auto gaps = objective.contact().bodies().gaps();
-  Change state{{position.begin(), position.end()}, {gaps.begin(), gaps.end()}, {}};
-  const mechanics::CutFaceContact& cut_faces = objective.contact().cut_faces();
-  for (size_t w = 0; w < cut_faces.size(); ++w) state.cut_faces.push_back(cut_faces.gap(w));
-  return state;
+  return {{position.begin(), position.end()}, objective.contact().gaps()};
 }
 
 /// The derivative of the gradient, into `slope`, and of fixed points and gaps by a component of a
@@ -61,8 +57,7 @@ Change differentiate_by(discrete::Objective& objective, Vec displacement, const 
       values[i] = (values[i] - earlier[i]) / (2 * difference);
   };
   differentiate(to.travel, from.travel);
-  differentiate(to.bodies, from.bodies);
-  differentiate(to.cut_faces, from.cut_faces);
+  differentiate(to.gaps, from.gaps);
   evaluate(0, before);
   return to;
 }
@@ -210,7 +205,7 @@ std::optional<Gradient> differentiate(Problem& problem, const discrete::NaturalR
       adjoint.emplace(response, positions, natural.owned(requested.functional));
     const auto add = [&](const std::string& name, const char* unit, Change change,
                          std::vector<double> Gradient::*derivatives) {
-      response.forces_of_gaps(change.bodies, change.cut_faces, forces);
+      response.forces_of_gaps(change.gaps, forces);
       if (adjoint)
         (adjoint->result().*derivatives)
             .push_back(adjoint->derivative(slope, forces, change.travel));
@@ -227,10 +222,8 @@ std::optional<Gradient> differentiate(Problem& problem, const discrete::NaturalR
       }
     positions.update(displacement);
     const StrataForces strata(objective, requested);
-    const mechanics::BodyContact& bodies = objective.contact().bodies();
     const Change unchanged{std::vector<Vec3>(positions.local().size(), Vec3::Zero()),
-                           std::vector<double>(bodies.gaps().size(), 0.0),
-                           std::vector<double>(objective.contact().cut_faces().size(), 0.0)};
+                           std::vector<double>(objective.contact().size(), 0.0)};
     for (size_t s = 0; s < requested.strata.size(); ++s) {
       if (abandoned()) return {};
       strata.assemble(s, slope);

@@ -2,7 +2,6 @@
 
 #include <utility>
 
-#include "contact_penalty.h"
 #include "repose/base/agreement.h"
 #include "repose/base/collective.h"
 #include "repose/discrete/natural_rows.h"
@@ -44,7 +43,7 @@ void bring_to_contact(const discrete::NaturalRows& natural, const RestState& res
   const MPI_Comm comm = objective.positions().comm();
   std::vector<double> pressure = rest.pressure;
   if (base::rank(comm) == 0) pressure.resize(rest.position.size(), 0.0);
-  set_pressures(objective, natural.owned(base::scatter(comm, pressure)));
+  objective.contact().set_pressures(natural.owned(base::scatter(comm, pressure)));
   problem.tangent().invalidate();
 }
 

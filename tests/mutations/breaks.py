@@ -255,7 +255,7 @@ BREAKS = [
     ),
     (
         "what passes into bone is not in the estimate",
-        "outcome.displacement_error += contact_safety * penalty_.violation();",
+        "outcome.displacement_error += contact_safety * objective_.contact().violation();",
         "",
         r"^solve\.contact",
     ),
@@ -267,7 +267,7 @@ BREAKS = [
     ),
     (
         "the penetration is not told",
-        "for (const double gap : objective.contact().bodies().gaps()) deepest = std::max(deepest, -gap);",
+        "for (const double gap : gaps()) deepest = std::max(deepest, -gap);",
         "",
         r"^solve\.contact|^program\.(contact|instruments)",
     ),

@@ -19,6 +19,11 @@ class Tangent : public Hessian {
   void invalidate() { state_changed_ = true; }
   /// The next assembly takes the objective's contact as it is then.
   void forget_contact() { contact_changed_ = true; }
+  /// Returns the objective's contact, to be changed: the next assembly takes it as it is then.
+  Contact& change_contact() {
+    forget_contact();
+    return objective_.contact();
+  }
 
   /// Takes these blocks, exact and of the semidefinite relative, in place of the objective's
   /// contact until the state changes.
