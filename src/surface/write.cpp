@@ -92,59 +92,42 @@ std::string base64(const std::string& bytes) {
   return text;
 }
 
-/// One DataArray; `values` are its raw bytes.
+/// One DataArray; rows of several numbers lie without gaps between them.
+template <class Row>
 std::string array(const char* type, const std::string& name, int components,
-                  const std::string& values) {
+                  const std::vector<Row>& rows) {
   std::string bytes;
-  append(bytes, static_cast<uint64_t>(values.size()));
+  append(bytes, static_cast<uint64_t>(rows.size() * sizeof(Row)));
+  if (!rows.empty())
+    bytes.append(reinterpret_cast<const char*>(rows.data()), rows.size() * sizeof(Row));
   return fmt::format(
       "<DataArray type=\"{}\" Name=\"{}\" NumberOfComponents=\"{}\" format=\"binary\">\n{}\n"
       "</DataArray>\n",
-      type, name, components, base64(bytes + values));
+      type, name, components, base64(bytes));
 }
 
 std::string point_data(const PointData& data) {
   std::string text = data.fields.empty()
                          ? "<PointData>\n"
                          : fmt::format("<PointData Scalars=\"{}\">\n", data.fields[0].name);
-  for (const auto& field : data.fields) {
-    std::string bytes;
-    for (const double value : field.values) append(bytes, value);
-    text += array("Float64", field.name, 1, bytes);
-  }
-  for (const auto& field : data.vectors) {
-    std::string bytes;
-    for (const Vec3& value : field.values)
-      for (int axis = 0; axis < 3; ++axis) append(bytes, value[axis]);
-    text += array("Float64", field.name, 3, bytes);
-  }
-  if (!data.colors.empty()) {
-    std::string bytes;
-    for (const auto& color : data.colors)
-      for (const uint8_t part : color) append(bytes, part);
-    text += array("UInt8", "color", 3, bytes);
-  }
+  for (const auto& field : data.fields) text += array("Float64", field.name, 1, field.values);
+  for (const auto& field : data.vectors) text += array("Float64", field.name, 3, field.values);
+  if (!data.colors.empty()) text += array("UInt8", "color", 3, data.colors);
   return text + "</PointData>\n";
 }
 
 /// A surface as VTK XML PolyData: arrays as base64 with 64-bit lengths, not compressed.
 std::string vtp_bytes(const Surface& surface, const PointData& data) {
-  std::string points, corners, ends;
-  for (const Vec3& point : surface.points)
-    for (int axis = 0; axis < 3; ++axis) append(points, point[axis]);
-  int64_t end = 0;
-  for (const Triangle& triangle : surface.triangles) {
-    for (const int64_t vertex : triangle) append(corners, vertex);
-    append(ends, end += 3);
-  }
+  std::vector<int64_t> ends(surface.triangles.size());
+  for (size_t t = 0; t < ends.size(); ++t) ends[t] = static_cast<int64_t>(3 * (t + 1));
   return fmt::format(
              "<?xml version=\"1.0\"?>\n<VTKFile type=\"PolyData\" version=\"1.0\" "
              "byte_order=\"LittleEndian\" header_type=\"UInt64\">\n<PolyData>\n"
              "<Piece NumberOfPoints=\"{}\" NumberOfVerts=\"0\" NumberOfLines=\"0\" "
              "NumberOfStrips=\"0\" NumberOfPolys=\"{}\">\n",
              surface.points.size(), surface.triangles.size()) +
-         point_data(data) + "<Points>\n" + array("Float64", "Points", 3, points) +
-         "</Points>\n<Polys>\n" + array("Int64", "connectivity", 1, corners) +
+         point_data(data) + "<Points>\n" + array("Float64", "Points", 3, surface.points) +
+         "</Points>\n<Polys>\n" + array("Int64", "connectivity", 1, surface.triangles) +
          array("Int64", "offsets", 1, ends) + "</Polys>\n</Piece>\n</PolyData>\n</VTKFile>\n";
 }
 
