@@ -33,6 +33,9 @@ class Search {
   void lack(const std::string& name, const std::string& why) {
     if (!given_.contains(name) && !found_.contains(name)) missing_[name] = why;
   }
+  void lack(std::initializer_list<const char*> names, const std::string& why) {
+    for (const char* name : names) lack(name, why);
+  }
 
   /// In the frame; nothing where it is neither given nor found.
   std::optional<Vec3> find(const std::string& name) const {

@@ -104,8 +104,7 @@ void search_symphysis(const Mandible& mandible, Search& search) {
   const FrontMap map(mandible.surface, search.frame());
   auto profile = map.profile(map.low_z(), map.high_z(), midline);
   const auto lacks = [&](const char* why) {
-    for (const char* name : {"menton_bone", "pogonion_bone", "b_point", "lower_incisor_edge"})
-      search.lack(name, why);
+    search.lack({"menton_bone", "pogonion_bone", "b_point", "lower_incisor_edge"}, why);
   };
   if (profile.empty()) return lacks("MANDIBLE has no bone at the midline");
   const double front = foremost_of(profile)->x(), aside = middle_of_chin(map, profile.front().y());
@@ -239,11 +238,9 @@ void search_nasal_opening(const FrontMap& map, const ProfilePoint& edge, Search&
   constexpr double near = 3;  // mm, of the spine to the nasal floor's height
   const auto profile = map.profile(edge.y(), map.high_z(), midline);
   const auto floor = nasal_floor(map, edge);
-  if (!floor) {
-    for (const char* name : {"nasal_spine", "a_point", "nasion_bone"})
-      search.lack(name, "SKULL has no nasal opening above the upper incisors");
-    return;
-  }
+  if (!floor)
+    return search.lack({"nasal_spine", "a_point", "nasion_bone"},
+                       "SKULL has no nasal opening above the upper incisors");
   std::optional<ProfilePoint> deepest;
   for (const ProfilePoint& p : profile)
     if (p.y() > *floor && p.y() < *floor + 25 && (!deepest || p.x() > deepest->x())) deepest = p;
@@ -282,8 +279,8 @@ void search_upper_jaw(const FrontMap& map, Search& search) {
   }
   const auto edge = search.profile_point("upper_incisor_edge");
   if (edge) return search_nasal_opening(map, *edge, search);
-  for (const char* name : {"upper_incisor_edge", "nasal_spine", "a_point", "nasion_bone"})
-    search.lack(name, "SKULL has no bone in front, 14 to 32 mm above the lower incisors");
+  search.lack({"upper_incisor_edge", "nasal_spine", "a_point", "nasion_bone"},
+              "SKULL has no bone in front, 14 to 32 mm above the lower incisors");
 }
 
 }  // namespace

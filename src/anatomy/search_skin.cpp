@@ -43,9 +43,9 @@ double search_mouth(const FrontMap& skin, Search& search) {
   if (z) crease = follow_crease(skin, *z, search.find("mouth_right"), search.find("mouth_left"));
   if (!z && edge) crease = follow_crease(skin, edge->z(), {}, {});
   if (crease.points.size() < 3) {
-    for (const char* name : {"stomion", "mouth_right", "mouth_left"})
-      search.lack(name, edge ? "SKIN has no crease between lips near the upper incisors"
-                             : "the upper incisors were not found");
+    search.lack({"stomion", "mouth_right", "mouth_left"},
+                edge ? "SKIN has no crease between lips near the upper incisors"
+                     : "the upper incisors were not found");
     return 0;
   }
   const auto middle = std::min_element(
@@ -86,11 +86,8 @@ void put_inside(const std::string& name, const std::optional<ProfilePoint>& poin
 
 void search_nose_tip(const SkinProfile& profile, Search& search) {
   const auto nasion = search.find("nasion_bone"), spine = search.find("nasal_spine");
-  if (!spine) {
-    for (const char* name : {"pronasale", "subnasale", "nasion_soft"})
-      search.lack(name, "the nasal spine was not found");
-    return;
-  }
+  if (!spine)
+    return search.lack({"pronasale", "subnasale", "nasion_soft"}, "the nasal spine was not found");
   const double top = nasion ? nasion->z() : spine->z() + 45;
   put_inside("pronasale", foremost_of(between(profile.points, spine->z() - 10, top)), profile,
              "SKIN has no nose", search);
@@ -109,11 +106,9 @@ void search_lips(const SkinProfile& profile, const SkinProfile& at_chin, double 
   const auto tip = search.profile_point("pronasale"), stomion = search.profile_point("stomion"),
              spine = search.profile_point("nasal_spine");
   const auto chin = search.profile_point("pogonion_soft");
-  if (!tip || !stomion || !spine) {
-    for (const char* name : {"subnasale", "upper_lip", "lower_lip", "b_soft"})
-      search.lack(name, "nose or mouth was not found");
-    return;
-  }
+  if (!tip || !stomion || !spine)
+    return search.lack({"subnasale", "upper_lip", "lower_lip", "b_soft"},
+                       "nose or mouth was not found");
   const double s = stomion->y(), low = gap > 0 ? s - gap : s - 2;  // where the lower lip begins
   const auto first = foremost_of(between(profile.points, s + 2, s + 0.6 * (tip->y() - s)));
   if (first)
@@ -147,11 +142,8 @@ void search_soft_chin(const SkinProfile& at_chin, const surface::Surface& skin, 
   constexpr double around = 3, most_above = 9;  // mm
   constexpr double share = 0.08;                // of the height of the face
   const auto menton = search.find("menton_bone"), chin = search.find("pogonion_bone");
-  if (!menton || !chin) {
-    for (const char* name : {"pogonion_soft", "menton_soft"})
-      search.lack(name, "the chin of MANDIBLE was not found");
-    return;
-  }
+  if (!menton || !chin)
+    return search.lack({"pogonion_soft", "menton_soft"}, "the chin of MANDIBLE was not found");
   const auto nasion = search.find("nasion_bone");
   const double above =
       nasion ? std::min(most_above, share * (nasion->z() - menton->z())) : most_above;
