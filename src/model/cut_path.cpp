@@ -7,7 +7,6 @@
 #include "repose/base/error.h"
 #include "repose/surface/distance.h"
 #include "repose/surface/triangle_tree.h"
-#include "split_mesh.h"
 
 namespace repose::model {
 namespace {
@@ -17,6 +16,107 @@ constexpr double snap = 0.1;     // of an edge: nearer than this the path goes t
 constexpr double spacing = 0.5;  // of an edge, between points of the path
 
 using Chain = std::vector<int64_t>;
+
+/// A triangle surface whose edges and triangles can be split, in place. New vertices and triangles
+/// come at the end of their lists. Edges have at most two triangles.
+class SplitMesh {
+ public:
+  explicit SplitMesh(surface::Surface& surface);
+
+  const Vec3& point(int64_t vertex) const { return surface_.points[vertex]; }
+  const Triangle& triangle(int64_t row) const { return surface_.triangles[row]; }
+  const std::vector<int64_t>& triangles_of(int64_t vertex) const { return around_[vertex]; }
+  bool has_edge(int64_t a, int64_t b) const { return !triangles_of_edge(a, b).empty(); }
+  bool on_border(int64_t vertex) const;
+  /// Mean length of a triangle's edges, mm.
+  double edge_length(int64_t triangle) const;
+
+  /// Both return the new vertex.
+  int64_t split_edge(int64_t a, int64_t b, const Vec3& at);
+  int64_t split_triangle(int64_t row, const Vec3& at);
+
+ private:
+  std::vector<int64_t> triangles_of_edge(int64_t a, int64_t b) const;
+  int64_t add_vertex(const Vec3& at);
+  void put(int64_t row, const Triangle& corners);
+  void remove(int64_t row);
+
+  surface::Surface& surface_;
+  std::vector<std::vector<int64_t>> around_;  // [P] triangles of a vertex
+};
+
+SplitMesh::SplitMesh(surface::Surface& surface)
+    : surface_(surface), around_(surface.points.size()) {
+  for (size_t row = 0; row < surface.triangles.size(); ++row)
+    for (const int64_t v : surface.triangles[row]) around_[v].push_back(static_cast<int64_t>(row));
+}
+
+std::vector<int64_t> SplitMesh::triangles_of_edge(int64_t a, int64_t b) const {
+  std::vector<int64_t> rows;
+  for (const int64_t row : around_[a]) {
+    const Triangle& t = triangle(row);
+    if (std::find(t.begin(), t.end(), b) != t.end()) rows.push_back(row);
+  }
+  return rows;
+}
+
+bool SplitMesh::on_border(int64_t vertex) const {
+  for (const int64_t row : around_[vertex])
+    for (const int64_t other : triangle(row))
+      if (other != vertex && triangles_of_edge(vertex, other).size() < 2) return true;
+  return false;
+}
+
+double SplitMesh::edge_length(int64_t row) const {
+  const auto& [a, b, c] = triangle(row);
+  return ((point(b) - point(a)).norm() + (point(c) - point(b)).norm() +
+          (point(a) - point(c)).norm()) /
+         3;
+}
+
+int64_t SplitMesh::add_vertex(const Vec3& at) {
+  surface_.points.push_back(at);
+  around_.emplace_back();
+  return static_cast<int64_t>(surface_.points.size()) - 1;
+}
+
+void SplitMesh::remove(int64_t row) {
+  for (const int64_t v : triangle(row)) std::erase(around_[v], row);
+}
+
+void SplitMesh::put(int64_t row, const Triangle& corners) {
+  if (row < static_cast<int64_t>(surface_.triangles.size()))
+    surface_.triangles[row] = corners;
+  else
+    surface_.triangles.push_back(corners);
+  for (const int64_t v : corners) around_[v].push_back(row);
+}
+
+int64_t SplitMesh::split_edge(int64_t a, int64_t b, const Vec3& at) {
+  const std::vector<int64_t> rows = triangles_of_edge(a, b);
+  const int64_t middle = add_vertex(at);
+  for (const int64_t row : rows) {
+    Triangle near_a = triangle(row), near_b = near_a;
+    remove(row);
+    std::replace(near_a.begin(), near_a.end(), b, middle);
+    std::replace(near_b.begin(), near_b.end(), a, middle);
+    put(row, near_a);
+    put(static_cast<int64_t>(surface_.triangles.size()), near_b);
+  }
+  return middle;
+}
+
+int64_t SplitMesh::split_triangle(int64_t row, const Vec3& at) {
+  const Triangle whole = triangle(row);
+  const int64_t middle = add_vertex(at);
+  remove(row);
+  for (int corner = 0; corner < 3; ++corner) {
+    Triangle part = whole;
+    part[corner] = middle;
+    put(corner == 0 ? row : static_cast<int64_t>(surface_.triangles.size()), part);
+  }
+  return middle;
+}
 
 std::string format_point(const Vec3& x) { return fmt::format("{:.2f}", x); }
 
