@@ -54,8 +54,7 @@ std::vector<Vec3> samples_of(const surface::Surface& surface, double side) {
   std::vector<Vec3> points = surface.points;
   for (const Triangle& triangle : surface.triangles) {
     const auto [a, b, c] = surface::corners(surface, triangle);
-    const double longest = std::max({(b - a).norm(), (c - b).norm(), (a - c).norm()});
-    const int parts = static_cast<int>(std::ceil(longest / side));
+    const int parts = static_cast<int>(std::ceil(surface::longest_side({a, b, c}) / side));
     for (int i = 0; parts > 1 && i <= parts; ++i)
       for (int j = 0; i + j <= parts; ++j)
         points.push_back(a + (i * (b - a) + j * (c - a)) / parts);

@@ -164,22 +164,16 @@ Piece ColumnGeometry::piece(const std::vector<int64_t>& columns) const {
     piece.edge.insert(piece.edge.end(), layout.mesh.triangle_edges[t].begin(),
                       layout.mesh.triangle_edges[t].end());
   base::sort_unique(piece.edge);
-  for (const int64_t c : piece.column) {
-    piece.skin.push_back(layout.mesh.points[c]);
-    piece.deep.push_back(layout.columns.deep[c]);
-    piece.rim.push_back(layout.rim[c]);
-    piece.parted.push_back(state_->parted[c]);
-  }
+  const auto here = [&](const auto& values) { return base::pick(values, piece.column); };
+  piece.skin = here(layout.mesh.points);
+  piece.deep = here(layout.columns.deep);
+  piece.rim = here(layout.rim);
+  piece.parted = here(state_->parted);
   const ColumnEnds& ends = layout.attachment;
-  piece.ends = {base::pick(ends.bone, piece.column),
-                base::pick(ends.slides_on, piece.column),
-                base::pick(ends.free, piece.column),
-                base::pick(ends.support, piece.column),
-                base::pick(ends.support_stiffness, piece.column),
-                base::pick(ends.supported_whole, piece.column)};
+  piece.ends = {here(ends.bone),    here(ends.slides_on),         here(ends.free),
+                here(ends.support), here(ends.support_stiffness), here(ends.supported_whole)};
   const ColumnLoads& loads = state_->loads;
-  piece.loads = {base::pick(loads.instrument, piece.column), base::pick(loads.target, piece.column),
-                 base::pick(loads.force, piece.column), loads.layer_area};
+  piece.loads = {here(loads.instrument), here(loads.target), here(loads.force), loads.layer_area};
   const auto rows_of = [&](std::array<int64_t, 3> columns) {
     for (int64_t& c : columns) c = std::ranges::lower_bound(piece.column, c) - piece.column.begin();
     return columns;

@@ -293,55 +293,37 @@ void require_closed(const std::string& name, const surface::Surface& mesh,
                  surface::describe(defects));
 }
 
-/// Shapes of bodies, in rows of contact/body_shape or as a mesh.
-class ShapeCheck {
- public:
-  ShapeCheck(size_t row, const ArrayCheck& check) : row_(row), check_(check) {}
-
-  void operator()(const scene::Sphere& ball) const {
-    at(ball.center);
-    above_zero(ball.radius);
+/// Checks the shape of a body: its row of contact/body_shape, or its mesh.
+void check_shape(size_t row, const Body::Shape& shape, const ArrayCheck& check) {
+  const auto check_row = [&](const std::vector<Vec3>& vectors, const std::vector<double>& sizes) {
+    for (const Vec3& vector : vectors)
+      for (const double value : vector) check.number("contact/body_shape", row, value, place);
+    for (const double size : sizes)
+      check.number(
+          "contact/body_shape", row, size,
+          {0, max_coordinate, "mm", true, "a radius, a box's size, the length of a normal"});
+  };
+  if (const auto* ball = std::get_if<scene::Sphere>(&shape))
+    check_row({ball->center}, {ball->radius});
+  if (const auto* capsule = std::get_if<scene::Capsule>(&shape))
+    check_row({capsule->from, capsule->to}, {capsule->radius});
+  if (const auto* box = std::get_if<scene::Box>(&shape))
+    check_row({box->center}, {box->size.begin(), box->size.end()});
+  if (const auto* half = std::get_if<scene::HalfSpace>(&shape))
+    check_row({half->point, half->normal}, {half->normal.norm()});
+  if (const auto* mesh = std::get_if<surface::Surface>(&shape)) {
+    const std::string group = fmt::format("contact/body_mesh/{}", row);
+    check_surface(group, *mesh, check);
+    require_closed(group, *mesh, check);
   }
-  void operator()(const scene::Capsule& capsule) const {
-    at(capsule.from);
-    at(capsule.to);
-    above_zero(capsule.radius);
-  }
-  void operator()(const scene::Box& box) const {
-    at(box.center);
-    for (const double size : box.size) above_zero(size);
-  }
-  void operator()(const scene::HalfSpace& half) const {
-    at(half.point);
-    at(half.normal);
-    above_zero(half.normal.norm());
-  }
-  void operator()(const surface::Surface& mesh) const {
-    const std::string group = fmt::format("contact/body_mesh/{}", row_);
-    check_surface(group, mesh, check_);
-    require_closed(group, mesh, check_);
-  }
-
- private:
-  void at(const Vec3& numbers) const {
-    for (const double value : numbers) check_.number("contact/body_shape", row_, value, place);
-  }
-  void above_zero(double value) const {
-    check_.number(
-        "contact/body_shape", row_, value,
-        {0, max_coordinate, "mm", true, "a radius, a box's size, the length of a normal"});
-  }
-
-  size_t row_;
-  const ArrayCheck& check_;
-};
+}
 
 void require_bodies(const Model& m, const ArrayCheck& check) {
   if (m.contact.empty()) return;
   for (size_t k = 0; k < m.contact.bodies.size(); ++k) {
     const Body& body = m.contact.bodies[k];
     if (body.bone < 0)
-      std::visit(ShapeCheck(k, check), body.shape);
+      check_shape(k, body.shape, check);
     else if (m.bone_surfaces.empty())
       check.refuse("bone_surface", "is missing, but contact/body_bone row {} is bone {}", k,
                    m.bones[body.bone]);
