@@ -6,15 +6,6 @@
 
 namespace repose::solve {
 
-namespace {
-
-void combine_ranks(MPI_Comm comm, PenetrationDepth& on) {
-  on.points = base::sum_over_ranks(comm, on.points);
-  on.deepest = base::max_over_ranks_with(comm, on.deepest, on.where);
-}
-
-}  // namespace
-
 ExactPenetration::ExactPenetration(const discrete::Part& part)
     : part_(part), meshes_(part.body_meshes.size()) {}
 
@@ -50,7 +41,10 @@ std::vector<PenetrationDepth> ExactPenetration::measure(discrete::Objective& obj
   MPI_Comm comm = objective.positions().comm();
   std::vector<PenetrationDepth> depths(part_.bodies.size());
   base::collective_try(comm, [&] { measure_own(objective, depths); });
-  for (PenetrationDepth& on : depths) combine_ranks(comm, on);
+  for (PenetrationDepth& on : depths) {
+    on.points = base::sum_over_ranks(comm, on.points);
+    on.deepest = base::max_over_ranks_with(comm, on.deepest, on.where);
+  }
   return depths;
 }
 
