@@ -5,6 +5,7 @@
 #include "repose/anatomy/complete.h"
 #include "repose/base/log.h"
 #include "repose/model/collision.h"
+#include "repose/surface/read.h"
 #include "solved_skin.h"
 
 namespace repose::model {

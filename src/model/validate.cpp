@@ -6,6 +6,7 @@
 #include "array_check.h"
 #include "repose/base/error.h"
 #include "repose/base/geometry.h"
+#include "repose/model/material.h"
 #include "repose/model/model.h"
 #include "repose/model/prism_geometry.h"
 #include "repose/scene/rigid_motion.h"
