@@ -122,7 +122,12 @@ void CutFaceContact::add_place(int64_t point, double area, const Eigen::Vector2d
     if (weight != 0)
       for (const auto& [p, share] : own.controls[control]) shares[p] += weight * share;
   });
-  places_.push_back({nets_.size() - 1, point, area, {shares.begin(), shares.end()}});
+  places_.push_back({nets_.size() - 1,
+                     point,
+                     area,
+                     {shares.begin(), shares.end()},
+                     static_cast<int>(at[0]),
+                     static_cast<int>(at[1])});
 }
 
 void CutFaceContact::link(const Net& own, const Net& other) {
@@ -335,21 +340,25 @@ std::vector<LinearGap> CutFaceContact::linear_gaps(double reach) const {
   return gaps;
 }
 
-/// The gap's gradient as that between the point of either side that counts most: spread over all,
-/// a preconditioner that couples neighbors only would keep but a part of it.
+/// The gap's gradient as that between one layer of either side, the one that counts most: spread
+/// over several, a preconditioner that couples neighbors only would keep but a part of it.
 LinearGap::Gradient CutFaceContact::lumped(size_t w) const {
-  constexpr double weight = 0.7;  // between 1, what smooth motion meets, and that of one point
-  const Vec3& normal = feet_[w].normal;
-  std::pair<double, int32_t> own{0, -1}, other{0, -1};
-  for (const auto& [p, at_p] : touched(w)) {
-    const double share = normal.dot(at_p.col(0));
-    own = std::max(own, {share, p});
-    other = std::max(other, {-share, p});
-  }
+  std::map<int32_t, double> share;
+  const auto add = [&](const Net& net, const SplineWeights& along, int row, double scale) {
+    const auto control = [&](int k) { return net.controls.begin() + (along.first + k) * net.rows; };
+    const int inwards = row < net.rows / 2 ? 1 : -1;
+    while (control(0)[row].size() > 1) row += inwards;  // round an edge, of several points
+    for (int k = 0; k < along.count; ++k)
+      share[control(k)[row].front().first] += scale * along.of[0][k];
+  };
+  const auto& [net, point, area, shares, column, row] = places_[w];
+  const SplineWeights& inwards = feet_[w].patch.inwards;
+  const auto heaviest = std::ranges::max_element(inwards.of[0]) - inwards.of[0].begin();
+  add(nets_[net - 1], spline_weights(column, nets_[net - 1].columns), row, 1);
+  add(nets_[net], feet_[w].patch.along, inwards.first + static_cast<int>(heaviest), -1);
   LinearGap::Gradient lumped;
-  if (own.second >= 0) lumped.emplace_back(own.second, weight * normal);
-  if (other.second >= 0) lumped.emplace_back(other.second, -weight * normal);
-  std::ranges::sort(lumped, {}, [](const auto& of) { return of.first; });
+  for (const auto& [p, of] : share)
+    if (of != 0) lumped.emplace_back(p, of * feet_[w].normal);
   return lumped;
 }
 

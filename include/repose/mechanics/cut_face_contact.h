@@ -77,6 +77,7 @@ class CutFaceContact {
     int64_t point;
     double area;
     std::vector<Share> shares;
+    int column, row;  // of its own net
   };
   /// A net's surface around one place on it, and its derivatives along the cut and inwards.
   struct Patch {
