@@ -60,11 +60,10 @@ double Value::number_as(const std::string& expected) const {
   const auto value = node_.IsScalar() ? base::parse_number(node_.Scalar()) : std::nullopt;
   const Key& key = find_key(path_);
   if (!value || !key.range.contains(*value)) {
-    const bool turns = value && key.unit == "degrees" && std::isfinite(*value);
+    const double turned = value && std::isfinite(*value) ? std::remainder(*value, 360.0) : NAN;
+    const bool turns = key.unit == "degrees" && key.range.contains(turned);
     refuse("must be {}, it is {}{}", expected, quote(),
-           turns ? fmt::format("; write {:g}, which ends in the same place",
-                               std::remainder(*value, 360.0))
-                 : "");
+           turns ? fmt::format("; write {:g}, which ends in the same place", turned) : "");
   }
   return *value;
 }

@@ -188,12 +188,12 @@ void CollisionTree::build(std::vector<int64_t>& rows, size_t begin, size_t end) 
   build(rows, half, end);
 }
 
-bool touch(const CollisionTree& a, const CollisionTree& b, const Mat4& pose) {
+bool touch(const CollisionTree& a, const CollisionTree& b, const Mat4& pose, double margin) {
   bool found = false;
   visit_leaves(
-      a, b, pose, [&] { return found ? -1 : contact_margin; },
+      a, b, pose, [&] { return found ? -1 : margin; },
       [&](const auto&, const ShortestSegment& pair) {
-        found = found || pair.squared <= contact_margin * contact_margin;
+        found = found || pair.squared <= margin * margin;
       });
   return found;
 }
@@ -229,7 +229,14 @@ namespace {
 
 bool is_near(const Corners& t, const CollisionTree& other, double near) {
   const CollisionTree alone({"triangle", {t[0], t[1], t[2]}, {{0, 1, 2}}});
-  return nearest(alone, other, Mat4::Identity(), near).has_value();
+  return touch(alone, other, Mat4::Identity(), near);
+}
+
+/// [triangles of a] 1 where one lies within `near` mm of b. Of all pairs there may be too many.
+std::vector<char> triangles_near(const CollisionTree& a, const CollisionTree& b, double near) {
+  std::vector<char> found(a.triangles());
+  for (int64_t t = 0; t < a.triangles(); ++t) found[t] = is_near(a.corners(t), b, near);
+  return found;
 }
 
 void append_triangle(const Corners& t, Surface& soup) {
@@ -242,8 +249,7 @@ void append_triangle(const Corners& t, Surface& soup) {
 
 Surface refine_near(const Surface& surface, const CollisionTree& own, const CollisionTree& other,
                     double near, double longest) {
-  std::vector<char> touching(surface.triangles.size(), 0);
-  for (const auto& [s, t] : pairs_within(own, other, Mat4::Identity(), near)) touching[s] = 1;
+  const std::vector<char> touching = triangles_near(own, other, near);
   Surface result{surface.name, surface.points, {}};
   std::vector<Corners> left;
   for (size_t t = 0; t < touching.size(); ++t) {
@@ -267,7 +273,7 @@ Surface refine_near(const Surface& surface, const CollisionTree& own, const Coll
 }
 
 Encounter::Side Encounter::make_side(const CollisionTree& tree, const Twist& twist) {
-  Side side{&tree, {}, std::vector<char>(tree.triangles(), 0), {}};
+  Side side{&tree, {}, {}, {}};
   for (const Node& node : tree.nodes())
     side.speed.push_back((twist.angular.cross(node.center) + twist.linear).norm() +
                          twist.angular.norm() * node.half.norm());
@@ -287,12 +293,13 @@ Encounter::Encounter(const CollisionTree& a, const CollisionTree& b, const Twist
                      const Twist& twist_b, double touching,
                      const std::array<std::vector<char>, 2>& inside)
     : a_(make_side(a, twist_a)), b_(make_side(b, twist_b)) {
-  if (!inside[0].empty()) a_.ignored = inside[0];
-  if (!inside[1].empty()) b_.ignored = inside[1];
-  for (const auto& [s, t] : pairs_within(a, b, Mat4::Identity(), touching))
-    a_.ignored[s] = b_.ignored[t] = 1;
-  summarize(a_);
-  summarize(b_);
+  const auto ignore = [&](Side& side, const CollisionTree& other, const std::vector<char>& more) {
+    side.ignored = triangles_near(*side.tree, other, touching);
+    for (size_t t = 0; t < more.size(); ++t) side.ignored[t] |= more[t];
+    summarize(side);
+  };
+  ignore(a_, b, inside[0]);
+  ignore(b_, a, inside[1]);
 }
 
 double Encounter::ignored_area() const {
@@ -328,7 +335,7 @@ Encounter::Next Encounter::next(const Mat4& pose, double clearance) {
   };
   if (last[0] >= 0) leaf(last[0], last[1]);
   traverse(
-      a, b, key, [&] { return std::min(next.load, 2.0); }, leaf);
+      a, b, key, [&] { return next.load > 0 ? std::min(next.load, 2.0) : -1; }, leaf);
   return next;
 }
 

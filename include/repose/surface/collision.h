@@ -51,9 +51,10 @@ struct ClosestApproach {
   Vec3 at = Vec3::Zero();  ///< mm, the middle of the shortest way between them, in a's frame
 };
 
-/// Returns whether the surfaces come within contact_margin with `b` placed by `pose` (rigid) in the
+/// Returns whether the surfaces come within `margin` mm with `b` placed by `pose` (rigid) in the
 /// frame of `a`. A surface that lies wholly inside the other does not touch it.
-bool touch(const CollisionTree& a, const CollisionTree& b, const Mat4& pose);
+bool touch(const CollisionTree& a, const CollisionTree& b, const Mat4& pose,
+           double margin = contact_margin);
 
 /// The nearest triangles, no farther than `limit` mm apart.
 std::optional<ClosestApproach> nearest(const CollisionTree& a, const CollisionTree& b,
