@@ -4,28 +4,13 @@
 #include <array>
 #include <cmath>
 
-#include "lip_crease.h"
-#include "repose/anatomy/propose.h"
-#include "repose/base/error.h"
+#include "part_lips.h"
 #include "repose/scene/jaw_height.h"
 
 namespace repose::anatomy {
 namespace {
 
 using scene::find;
-
-HeadFrame frame_of(const scene::AnatomyPlan& plan) {
-  HeadFrame frame;
-  frame.axes = plan.axes;
-  const Vec3 *mouth_right = find(plan.landmarks, "mouth_right"),
-             *mouth_left = find(plan.landmarks, "mouth_left");
-  const Vec3* edge = find(plan.landmarks, "upper_incisor_edge");
-  if (mouth_right && mouth_left)
-    frame.origin = (*mouth_right + *mouth_left) / 2;
-  else if (edge)
-    frame.origin = *edge;
-  return frame;
-}
 
 /// Returns whether all of some landmarks are known; if not, remarks on the first that is missing
 /// and on the `effect`.
@@ -38,38 +23,6 @@ bool all_known(const scene::AnatomyPlan& plan, std::initializer_list<const char*
     return false;
   }
   return true;
-}
-
-bool has_mouth(const scene::Scene& scene) {
-  return std::any_of(scene.incisions.begin(), scene.incisions.end(),
-                     [](const scene::Incision& cut) { return cut.parts_lips(); });
-}
-
-void part_lips(const surface::Surface& skin, scene::Scene& scene,
-               std::vector<std::string>& remarks) {
-  const scene::AnatomyPlan& plan = *scene.anatomy;
-  if (!plan.part_lips || has_mouth(scene)) return;
-  const HeadFrame frame = frame_of(plan);
-  const Vec3* edge = find(plan.landmarks, "upper_incisor_edge");
-  const Vec3* stomion = find(plan.landmarks, "stomion");
-  const Vec3* height = stomion ? stomion : edge;
-  if (height && open_mouth(FrontMap(skin, frame), frame.to_frame(*height).z())) {
-    remarks.push_back(
-        "the mouth is open in the scan: the lips are apart already and are not parted");
-    return;
-  }
-  const std::vector<Vec3> path = find_lip_crease(skin, frame, plan.landmarks);
-  if (path.size() < 2)
-    base::refuse(
-        "{}: no crease between the lips was found on the skin by stomion, mouth_right and "
-        "mouth_left "
-        "or upper_incisor_edge; place these, give mouth: {{path: ...}}, or set anatomy.lips: "
-        "joined",
-        plan.file.string());
-  scene.incisions.push_back({path, scene.tissue.layers, "mouth"});
-  remarks.push_back(fmt::format(
-      "lips are parted along their crease by landmarks: {} points from {:.1f} to {:.1f}",
-      path.size(), path.front(), path.back()));
 }
 
 /// Lowest and highest z of the vestibule along the axes of the head: between B and the nasal spine

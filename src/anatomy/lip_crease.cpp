@@ -211,7 +211,7 @@ void bound(const FrontMap& skin, LipCrease& crease) {
   const auto [narrow, wide] = std::minmax(right, left);
   const bool one_fits = narrow >= nearest && narrow <= farthest;
   const double half = wide <= farthest ? std::max(wide, nearest) : one_fits ? narrow : usual;
-  if (narrow >= even * half && wide <= half) return;
+  if (narrow >= std::max(even * half, nearest) && wide <= half) return;
   crease.lost = {right, left};
   std::erase_if(points, [&](const Vec3& point) { return std::abs(point.x()) > half; });
   const auto on_the_right = mirrored(skin, points, points.front(), half),
@@ -226,10 +226,11 @@ LipCrease follow_touching(const FrontMap& skin, double z, const std::optional<Ve
   if (!middle) return {};
   LipCrease crease;
   const Vec3 start(0, middle->y, middle->height);
-  crease.points = follow_side(skin, start, middle->depth, -1, right);
+  const double depth = std::min(middle->depth, usual_depth);  // more is that of a narrow gap
+  crease.points = follow_side(skin, start, depth, -1, right);
   std::reverse(crease.points.begin(), crease.points.end());
   crease.points.push_back(start);
-  const auto other = follow_side(skin, start, middle->depth, 1, left);
+  const auto other = follow_side(skin, start, depth, 1, left);
   crease.points.insert(crease.points.end(), other.begin(), other.end());
   return crease;
 }

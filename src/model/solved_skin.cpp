@@ -2,10 +2,13 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "bone_field.h"
 #include "load_entry.h"
 #include "motion_range.h"
 #include "region.h"
+#include "repose/anatomy/complete.h"
 #include "repose/base/error.h"
 #include "repose/meshtools/face.h"
 #include "repose/surface/defects.h"
@@ -29,8 +32,11 @@ meshtools::FaceRequest request_of(const Anatomy& anatomy) {
     if (range.travel(anatomy.bones[b], static_cast<int32_t>(b)) > negligible_travel)
       request.beneath.push_back(anatomy.bones[b]);
   for (const scene::Force& force : scene.forces) request.places.push_back(force.at);
-  for (const scene::Incision& cut : scene.incisions)
-    request.places.insert(request.places.end(), cut.path.begin(), cut.path.end());
+  const auto cover = [&](const std::vector<Vec3>& path) {
+    request.places.insert(request.places.end(), path.begin(), path.end());
+  };
+  for (const scene::Incision& cut : scene.incisions) cover(cut.path);
+  if (scene.anatomy) cover(scene.anatomy->lip_gap);
   return request;
 }
 
@@ -85,7 +91,9 @@ void remesh_skin(Anatomy& anatomy) {
   const meshtools::FaceRequest request = request_of(anatomy);
   meshtools::Face face = meshtools::solvable_face(anatomy.skin, request);
   anatomy.remarks.push_back(describe_remeshing(face, anatomy, request.edge));
-  if (face.openings >= face.borders && face.borders > 0 && face.openings > 0)
+  anatomy::fit_lips(face.skin, anatomy.scene, anatomy.remarks);
+  const bool parted = std::ranges::any_of(anatomy.scene.incisions, &scene::Incision::parts_lips);
+  if (!parted && face.openings >= face.borders && face.borders > 0 && face.openings > 0)
     anatomy.warnings.push_back(fmt::format(
         "remeshing closed {} of {} openings of the given skin, such as its mouth: give a smaller "
         "tissue.edge, or part the lips by mouth.path",

@@ -13,4 +13,8 @@ namespace repose::anatomy {
 /// `remarks`. Throws InputError where no crease is found.
 void complete(const surface::Surface& skin, scene::Scene& scene, std::vector<std::string>& remarks);
 
+/// Fits the parting of the lips to the skin that is solved in place of the one that complete() was
+/// given: where the lips were apart and that skin is closed, they are parted along the gap.
+void fit_lips(const surface::Surface& skin, scene::Scene& scene, std::vector<std::string>& remarks);
+
 }  // namespace repose::anatomy

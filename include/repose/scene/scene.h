@@ -236,9 +236,10 @@ struct Contact {
 
 /// A cut in the skin.
 struct Incision {
-  std::vector<Vec3> path;  ///< mm, at least two points on or near the skin
-  int layers;              ///< point layers that it parts, from the skin down, ≥ 1
-  std::string name = {};   ///< where the scene tells of it
+  std::vector<Vec3> path;     ///< mm, at least two points on or near the skin
+  int layers;                 ///< point layers that it parts, from the skin down, ≥ 1
+  std::string name = {};      ///< where the scene tells of it
+  bool by_landmarks = false;  ///< found on the skin that the scene names
   bool parts_lips() const { return name == "mouth"; }
 };
 
@@ -286,6 +287,7 @@ struct AnatomyPlan {
   double adhesion = 5e-4;  ///< N/mm², largest tension between lips and the teeth of their jaw
   double tone = 0.006;     ///< N/mm², of the ring muscle at the line between the lips
   double pedicle = 0.5;  ///< least share of the tissue on a genioplasty's piece that stays attached
+  std::vector<Vec3> lip_gap = {};  ///< mm, along the middle of the gap between lips that are apart
 };
 
 /// The gap in front of the lower teeth, mm: `lower_gap`, or half of the overjet, at least `gap` and
