@@ -4,12 +4,14 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
 
 #include "../../folder.h"
 #include "repose/anatomy/propose.h"
 #include "repose/scene/landmark_names.h"
+#include "repose/surface/edges.h"
 #include "repose/surface/read.h"
 #include "repose/surface/triangle_tree.h"
 
@@ -98,6 +100,53 @@ TEST(CompleteScene, AnOpenMouthIsNotParted) {
   const Completed done = complete_shipped();
   EXPECT_TRUE(done.scene.incisions.empty());
   EXPECT_TRUE(says(done, "the mouth is open in the scan"));
+}
+
+/// Closes the openings of a skin whose border lies within `reach` mm of a place.
+surface::Surface closed_near(surface::Surface skin, const Vec3& place, double reach) {
+  const surface::EdgeTable edges(skin.triangles);
+  skin.points.push_back(place);
+  for (int64_t e = 0; e < edges.edges(); ++e) {
+    const surface::HalfEdge& half = edges[e].front();
+    if (edges[e].size() > 1 || (skin.points[half.low] - place).norm() > reach) continue;
+    skin.triangles.push_back({half.low, half.high, std::ssize(skin.points) - 1});
+  }
+  return skin;
+}
+
+TEST(FitLips, AMouthThatTheSolvedSkinClosesIsParted) {
+  const surface::Surface given = surface::read_surface(REPOSE_MESHES "/head_skin.ply");
+  Completed open = complete_shipped(), closed = open;
+  fit_lips(given, open.scene, open.remarks);
+  EXPECT_TRUE(open.scene.incisions.empty());
+  const Vec3 stomion = closed.scene.anatomy->landmarks.at("stomion");
+  const surface::Surface solved = closed_near(given, stomion, 40);
+  fit_lips(solved, closed.scene, closed.remarks);
+  ASSERT_EQ(closed.scene.incisions.size(), 1u);
+  EXPECT_TRUE(closed.scene.incisions[0].parts_lips());
+  EXPECT_GT(closed.scene.incisions[0].path.size(), 10u);
+  fit_lips(solved, closed.scene, closed.remarks);
+  EXPECT_EQ(closed.scene.incisions.size(), 1u) << "parted already";
+}
+
+TEST(FitLips, ACreaseThatTheGivenSkinHasDeeperIsBroughtForward) {
+  const surface::Surface given = surface::read_surface(REPOSE_MESHES "/head_skin.ply");
+  Completed done = complete_shipped();
+  scene::AnatomyPlan& plan = *done.scene.anatomy;
+  plan.lip_gap.clear();
+  const std::array on_skin{plan.landmarks.at("pronasale"), plan.landmarks.at("pogonion_soft")};
+  scene::Incision& cut = done.scene.incisions.emplace_back();
+  for (const double behind : {0.5, 8.0})
+    for (const bool by_landmarks : {false, true}) {
+      cut.by_landmarks = by_landmarks;
+      cut.path = {on_skin[0] + Vec3(0, behind, 0), on_skin[1] + Vec3(0, behind, 0)};
+      fit_lips(given, done.scene, done.remarks);
+      for (const int i : {0, 1}) {
+        const Vec3 moved = cut.path[i] - on_skin[i];
+        EXPECT_NEAR(moved.y(), by_landmarks && behind > 2 ? 0 : behind, 0.3);
+        EXPECT_NEAR(std::hypot(moved.x(), moved.z()), 0, 1e-9);
+      }
+    }
 }
 
 TEST(CompleteScene, TheVestibuleComesBeforeRegionsOfTheScene) {
