@@ -60,7 +60,7 @@ else
   landmarks=(-landmarks meshes/head.mrk.json)
 fi
 result=$build/demo/$(basename "$scene" .yaml)
-mpirun -n 2 "$build/bin/repose-solve" "$scene" -output "$result"
+mpirun -n 2 "$build/bin/repose-solve" "$scene" -output "$result" </dev/null # it reads all that it is given
 lap solve
 "$build/bin/repose-check" "$result.h5" | tee "${result}_check.txt" | tail -n 1
 lap check

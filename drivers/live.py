@@ -14,7 +14,6 @@ import json
 import pathlib
 import secrets
 import signal
-import subprocess
 import sys
 import threading
 import types
@@ -24,7 +23,7 @@ import webbrowser
 HERE = pathlib.Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE / "python"), str(HERE)]
 from sheet.scene import named_file, with_moves  # noqa: E402
-from sheet.script import Arguments, Unusable, number_from, refuse, refuse_missing, run  # noqa: E402
+from sheet.script import Arguments, Unusable, number_from, refuse, refuse_missing, run, start  # noqa: E402
 from sheet.summary import cautions, sentence  # noqa: E402
 from sheet.web_page import read_web, web_page  # noqa: E402
 
@@ -198,8 +197,8 @@ class Handler(http.server.BaseHTTPRequestHandler):
         with self.server.writing:
             self.server.session.write(name, request["plan"])
             written = file.stat()
-            done = subprocess.run([sys.executable, HERE / "report.py", name, "-output", f"{name}.html", "-scene",
-                                   self.server.scene], capture_output=True, text=True)
+            done = start(sys.executable, HERE / "report.py", name, "-output", f"{name}.html", "-scene",
+                         self.server.scene, capture_output=True, text=True)
         if done.returncode != 0:
             reason = done.stderr.strip().splitlines()[-1:] or ["report.py failed"]
             raise Unusable(f"{reason[0]}; {file} is written")

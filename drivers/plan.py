@@ -29,7 +29,6 @@ import os
 import pathlib
 import re
 import shlex
-import subprocess
 import sys
 import tempfile
 import time
@@ -40,7 +39,7 @@ HERE = pathlib.Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE), str(HERE / "python")]
 from planning.operation import NotUnderstood, read_operations, summarize  # noqa: E402
 from sheet.ply import Header  # noqa: E402
-from sheet.script import Arguments, number_from, reading, refuse, refuse_missing  # noqa: E402
+from sheet.script import Arguments, number_from, reading, refuse, refuse_missing, start  # noqa: E402
 from sheet.script import run as run_script  # noqa: E402
 
 try:
@@ -82,7 +81,7 @@ EXTENT = {"le_fort_1": (30, 50, 28), "genioplasty": (20, 20, 15)}
 def run(*command):
     """Runs one step, shows what it prints, and ends where it writes nothing. Returns its status."""
     print("$", shlex.join(map(str, command)), flush=True)
-    status = subprocess.run([str(word) for word in command]).returncode
+    status = start(*command).returncode
     if status not in (0, 2):
         refuse(f"{pathlib.Path(str(command[0])).name} ended with status {status}")
     return status
@@ -91,8 +90,7 @@ def run(*command):
 def draw(script, *arguments):
     """Returns the name of the picture or page that a script of this folder draws, to follow others; empty
     where it cannot, which is reported."""
-    command = [sys.executable, script, *arguments]
-    done = subprocess.run([str(word) for word in command], capture_output=True, text=True)
+    done = start(sys.executable, script, *arguments, capture_output=True, text=True)
     if done.returncode == 0:
         return f", {arguments[-1]}"
     print(f"{arguments[-1]} was not drawn: {done.stderr.strip()}", flush=True)

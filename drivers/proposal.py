@@ -10,7 +10,6 @@ PyYAML; surfaces of a scene are files, not volumes.
 """
 
 import pathlib
-import subprocess
 import sys
 import tempfile
 
@@ -19,7 +18,7 @@ import plan  # noqa: E402
 import render  # noqa: E402
 from sheet.landmarks import read_landmarks  # noqa: E402
 from sheet.scene import named_file, read_scene  # noqa: E402
-from sheet.script import Arguments, Unusable, reading, refuse  # noqa: E402
+from sheet.script import Arguments, Unusable, reading, refuse, start  # noqa: E402
 from sheet.script import run as run_script  # noqa: E402
 from sheet.whole_file import Target  # noqa: E402
 
@@ -32,7 +31,7 @@ SHORT = {"nasion_bone": "N", "nasal_spine": "ANS", "a_point": "A", "upper_inciso
 
 
 def run(*command):
-    done = subprocess.run([str(word) for word in command], capture_output=True, text=True)
+    done = start(*command, capture_output=True, text=True)
     if done.returncode:
         refuse(done.stderr.strip() or f"{command[0]} ended with status {done.returncode}")
 

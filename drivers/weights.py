@@ -11,11 +11,10 @@ Needs: apt-get install --no-install-recommends python3-h5py
 
 import os
 import pathlib
-import subprocess
 import sys
 import tempfile
 
-from sheet.script import Arguments, reading, refuse, refuse_missing, run
+from sheet.script import Arguments, reading, refuse, refuse_missing, run, start
 from sheet.whole_file import Target
 
 try:
@@ -36,9 +35,8 @@ def solve(program, scene, options):
     """The steps (attributes) of one run. Ends the script where the input is refused."""
     with tempfile.TemporaryDirectory() as folder:
         name = os.path.join(folder, "result")
-        done = subprocess.run([program, scene, *options, "-stability", "-output", name,
-                               "-time_limit", str(PATIENCE)],
-                              stdin=subprocess.DEVNULL, capture_output=True, text=True)
+        done = start(program, scene, *options, "-stability", "-output", name, "-time_limit", PATIENCE,
+                     capture_output=True, text=True)
         if done.returncode not in (0, 2):
             print(done.stderr.strip() or f"weights.py: repose-solve ended with status {done.returncode}",
                   file=sys.stderr)

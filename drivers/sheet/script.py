@@ -6,6 +6,7 @@ import contextlib
 import ctypes.util
 import math
 import os
+import subprocess
 import sys
 import zlib
 
@@ -52,6 +53,12 @@ def run(main):
         refuse(f"{reason.filename}: {reason.strerror}" if reason.filename else reason)
     except KeyboardInterrupt:
         sys.exit(130)
+
+
+def start(*command, **how):
+    """Runs a program as subprocess.run does, without this script's standard input: mpirun reads all of it, also
+    the lines that a loop of the shell around this script is about to read."""
+    return subprocess.run([str(word) for word in command], stdin=subprocess.DEVNULL, **how)
 
 
 @contextlib.contextmanager

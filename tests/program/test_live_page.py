@@ -370,7 +370,7 @@ def test_a_report_is_of_its_own_plan(live, served, tmp_path, monkeypatch):
     def write_meanwhile(*_, **__):
         os.utime(file, ns=(1, 1))
         return types.SimpleNamespace(returncode=0)
-    monkeypatch.setattr(live.subprocess, "run", write_meanwhile)
+    monkeypatch.setattr(live, "start", write_meanwhile)
     code, message = status(address, "/report", {"X-Token": server.token}, b'{"plan": {}}')
     assert code == 409 and f"{file} has been written by another program since" in message.decode()
 

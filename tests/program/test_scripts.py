@@ -1,6 +1,7 @@
 """Messages of every script in drivers if something is missing, wrong or damaged: one line, and what to do."""
 
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -146,6 +147,27 @@ def test_a_damaged_table_of_a_study_is_refused(script, tmp_path, file, old, new,
     else:
         assert (done.returncode, done.stderr) == (0, ""), done
         assert (tmp_path / "study_map.png").exists()
+
+
+# ----- programs that scripts start
+
+
+@pytest.mark.quick
+def test_a_loop_of_the_shell_keeps_its_lines(tmp_path, environment):
+    loop = f"""printf 'a\nb\n' | while read -r line; do echo "$line"
+        {sys.executable} -B -c 'from sheet.script import start; start("cat")'
+    done"""
+    done = finish(["bash", "-c", loop], tmp_path, environment | {"PYTHONPATH": str(PROJECT / "drivers")}, TIME_LIMIT)
+    assert (done.stdout, done.stderr) == ("a\nb\n", "")
+
+
+@pytest.mark.quick
+def test_no_script_gives_a_program_its_own_standard_input():
+    starts = {".py": r"subprocess\.(?:run|Popen|call|check_\w+)\((?:[^()]|\((?:[^()]|\([^()]*\))*\))*\)",
+              ".sh": r"(?m)^ *mpirun .*", ".slurm": r"(?m)^ *srun .*"}
+    calls = [(path.name, call) for path in (PROJECT / "drivers").rglob("*.*") if path.suffix in starts
+             for call in re.findall(starts[path.suffix], path.read_text())]
+    assert len(calls) == 6 and [name for name, call in calls if not re.search("stdin=|</dev/null", call)] == [], calls
 
 
 # ----- arguments

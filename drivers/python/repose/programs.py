@@ -33,5 +33,6 @@ def mpi_environment(environment):
     setup = FILE.parents[2] / "setup.sh"
     if not setup.is_file():
         return dict(environment)  # the package alone is installed
-    printed = subprocess.check_output(["bash", "-c", '. "$0" && mpi_environment && env -0', setup], env=environment)
+    printed = subprocess.check_output(["bash", "-c", '. "$0" && mpi_environment && env -0', setup], env=environment,
+                                      stdin=subprocess.DEVNULL)
     return {**dict(entry.split("=", 1) for entry in os.fsdecode(printed).split("\0") if entry), **environment}
