@@ -23,7 +23,8 @@ import webbrowser
 HERE = pathlib.Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE / "python"), str(HERE)]
 from sheet.scene import named_file, with_moves  # noqa: E402
-from sheet.script import Arguments, Unusable, number_from, refuse, refuse_missing, run, start  # noqa: E402
+from sheet.script import Arguments, Unusable, number_from, refuse, refuse_missing  # noqa: E402
+from sheet.script import require_file, run, start  # noqa: E402
 from sheet.summary import cautions, sentence  # noqa: E402
 from sheet.web_page import read_web, web_page  # noqa: E402
 
@@ -243,8 +244,7 @@ def main():
                         "writes, without ending; default: that of the scene with _plan, beside it")
     parser.add_argument("-no_browser", action="store_true", help="only print the address")
     options = parser.parse_args()
-    if not options.scene.is_file():
-        refuse(f"{options.scene}: no such file")
+    require_file(options.scene, "give a scene file (.yaml)")
     try:
         import repose
     except ImportError as missing:

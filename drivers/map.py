@@ -19,7 +19,7 @@ import pathlib
 import shlex
 import sys
 
-from sheet.script import Arguments, Unusable, number_from, refuse, refuse_missing, run
+from sheet.script import Arguments, Unusable, number_from, refuse, refuse_missing, require_file, run
 from sheet.web_page import read_web, web_page
 from sheet.whole_file import Target
 
@@ -155,8 +155,7 @@ def arguments():
     parser.add_argument("-cache", type=pathlib.Path, help="folder of solved plans (default: SCENE_map)")
     parser.add_argument("-plan", help="solve this plan, as JSON, in place of making the page")
     chosen = parser.parse_args()
-    if not chosen.scene.is_file():
-        refuse(f"{chosen.scene}: no such file")
+    require_file(chosen.scene, "give a scene file (.yaml)")
     given = [(f"-{name}", str(getattr(chosen, name))) for name in ("samples", "accuracy", "cache")
              if getattr(chosen, name) != parser.get_default(name)]
     chosen.command = shlex.join(["drivers/map.py", str(chosen.scene), *itertools.chain(*given)])

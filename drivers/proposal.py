@@ -18,7 +18,7 @@ import plan  # noqa: E402
 import render  # noqa: E402
 from sheet.landmarks import read_landmarks  # noqa: E402
 from sheet.scene import named_file, read_scene  # noqa: E402
-from sheet.script import Arguments, Unusable, reading, refuse, start  # noqa: E402
+from sheet.script import Arguments, Unusable, reading, refuse, require_file, start  # noqa: E402
 from sheet.script import run as run_script  # noqa: E402
 from sheet.whole_file import Target  # noqa: E402
 
@@ -191,8 +191,7 @@ def arguments():
     parser.add_argument("scene", type=pathlib.Path)
     parser.add_argument("-output", type=pathlib.Path)
     chosen = parser.parse_args()
-    if not chosen.scene.is_file():
-        refuse(f"{chosen.scene}: no such file")
+    require_file(chosen.scene, "give a scene file (.yaml)")
     chosen.output = Target(chosen.output or chosen.scene.with_name("proposal.png"), ".png", [chosen.scene])
     return chosen
 

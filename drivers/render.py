@@ -36,7 +36,7 @@ import sys
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from sheet import RAMP, REGION, rounded_up  # noqa: E402
 from sheet.script import (Arguments, Unusable, has_display, number_from, own_names, reading, refuse,  # noqa: E402
-                          refuse_missing, result_name, run)
+                          refuse_missing, require_file, result_name, run)
 from sheet.whole_file import Target  # noqa: E402
 
 if "REPOSE_RENDER" in os.environ:  # inside ParaView's interpreter, see find_screen
@@ -84,8 +84,8 @@ def arguments():
     made = "_and_".join([chosen.names[0], *map(os.path.basename, chosen.names[1:])])
     chosen.views = words("-views", chosen.views, tuple(VIEWS))
     chosen.columns = words("-columns", chosen.columns, COLUMNS)
-    if chosen.scene and not os.path.isfile(chosen.scene):
-        refuse(f"-scene {chosen.scene}: no such file")
+    if chosen.scene:
+        require_file(chosen.scene, "give a scene file (.yaml)", "-scene ")
     if chosen.film and len(chosen.names) > 1:
         refuse("-film shows one result, not two")
     chosen.output = Target(

@@ -16,7 +16,7 @@ and python3-yaml for -scene.
 
 import os
 
-from sheet.script import Arguments, own_names, refuse, refuse_missing, result_name, run
+from sheet.script import Arguments, own_names, refuse, refuse_missing, require_file, result_name, run
 from sheet.whole_file import Target
 
 try:
@@ -37,8 +37,8 @@ def arguments():
     chosen = parser.parse_intermixed_args()
     chosen.names = [result_name(name) for name in (chosen.name, chosen.other) if name is not None]
     for file in (chosen.scene, chosen.landmarks, chosen.skin, chosen.norms):
-        if file and not os.path.isfile(file):
-            refuse(f"{file}: no such file")
+        if file:
+            require_file(file, "choose another one, or leave it out")
     chosen.colors = chosen.skin
     if chosen.scene:
         from sheet.scene import named_file  # needs PyYAML

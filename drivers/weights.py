@@ -14,7 +14,7 @@ import pathlib
 import sys
 import tempfile
 
-from sheet.script import Arguments, reading, refuse, refuse_missing, run, start
+from sheet.script import Arguments, reading, refuse, refuse_missing, require_file, run, start
 from sheet.whole_file import Target
 
 try:
@@ -68,8 +68,7 @@ def arguments():
     chosen = parser.parse_args()
     chosen.program = os.path.join(chosen.bin, "repose-solve")
     for file in (chosen.program, chosen.scene):
-        if not os.path.isfile(file):
-            refuse(f"{file}: no such file; -bin names the folder of repose-solve")
+        require_file(file, "-bin names the folder of repose-solve")
     return chosen
 
 

@@ -128,13 +128,22 @@ def own_names(files):
             for file, name in zip(files, names)]
 
 
+def require_file(file, advice, option=""):
+    """Returns the name of a file that is there. Refuses a folder, and what is not there; `advice` says what to give,
+    `option` where."""
+    if not os.path.isfile(file):
+        refuse(f"{option}{file}: {'is a folder' if os.path.isdir(file) else 'no such file'}; {advice}")
+    return file
+
+
 def result_name(text):
     """The path of a result without its ending, which may be left out. Refuses one that is not there."""
     name = text[:-len(".h5")] if text.lower().endswith(".h5") else text
-    if not os.path.isfile(f"{name}.h5"):
-        scene = text.lower().endswith((".yaml", ".yml"))
-        refuse(f"{text}: is a scene; solve it, and give its result, NAME.h5" if scene else
-               f"{name}.h5: no such file; give what repose-solve writes, NAME or NAME.h5")
+    there = os.path.exists(f"{name}.h5")
+    if text.lower().endswith((".yaml", ".yml")) and not there:
+        refuse(f"{text}: is a scene; solve it, and give its result, NAME.h5")
+    require_file(text if os.path.isdir(text) and not there else f"{name}.h5",
+                 "give what repose-solve writes, NAME or NAME.h5")
     return name
 
 

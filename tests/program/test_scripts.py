@@ -89,6 +89,21 @@ def test_a_missing_file_is_one_line(script, name):
     says(script(name, *arguments), name)
 
 
+FOLDERS = {name: (["folder"], "folder") for name in ("report.py", "render.py", "map.py", "live.py", "proposal.py")}
+FOLDERS |= {"scene of report.py": (["r", "-scene", "folder"], "folder"),
+            "scene of render.py": (["r", "-scene", "folder"], "-scene folder"),
+            "ending of report.py": (["folder/r"], "folder/r.h5"), "weights.py": (["folder", "-bin", "."], "./repose-solve")}
+
+
+@pytest.mark.quick
+@pytest.mark.parametrize("case", FOLDERS)
+def test_a_folder_in_place_of_a_file_is_named_as_one(script, result, tmp_path, case):
+    (tmp_path / "folder/r.h5").mkdir(parents=True)
+    (tmp_path / "repose-solve").mkdir()
+    (arguments, file), name = FOLDERS[case], case.split()[-1]
+    says(script(name, *arguments), name, f"{name}: {file}: is a folder; ")
+
+
 @pytest.mark.quick
 def test_springs_are_named_where_a_result_has_none(script, solved):
     pytest.importorskip("matplotlib")

@@ -56,7 +56,8 @@ class Scene:
     def __init__(self, path):
         self.path = pathlib.Path(path).resolve()
         if not self.path.is_file():
-            raise FileNotFoundError(f"{path}: there is no such scene")
+            reason = "is a folder" if self.path.is_dir() else "there is no such scene"
+            raise FileNotFoundError(f"{path}: {reason}; give a scene file (.yaml)")
 
     def _text(self):
         """The scene as text without its comments; ValueError where it cannot be YAML."""
