@@ -41,6 +41,7 @@ from planning.operation import NotUnderstood, read_operations, summarize  # noqa
 from sheet.ply import Header  # noqa: E402
 from sheet.script import Arguments, number_from, reading, refuse, refuse_missing, start  # noqa: E402
 from sheet.script import run as run_script  # noqa: E402
+from sheet.whole_file import Target  # noqa: E402
 
 try:
     import numpy as np
@@ -175,7 +176,7 @@ class Segmentation:
         text += "".join(f"{key}: {fields[key]}\n" for key in ("space",) if key in fields)
         text += f"sizes: {' '.join(map(str, self.sizes))}\nencoding: raw\n"
         text += "".join(f"{key}: {value}\n" for key, value in fields.items() if key != "space")
-        file.write_bytes(text.encode() + b"\n" + mask.tobytes())
+        Target(file, ".nrrd").write(text.encode() + b"\n" + mask.tobytes())
 
 
 def bounds(file):
@@ -212,9 +213,10 @@ def begin_run(folder, operations, inputs):
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as reason:
-        refuse(f"{folder}: {reason.strerror}")
+        refuse(f"-output {folder}: cannot be made: {reason.strerror}; choose another folder")
     lock(folder)
     scene, inputs = folder / "scene.yaml", {file.resolve() for file in inputs}
+    begun_scene = Target(scene, ".yaml")
     old = [file for file in (folder / name for name in WRITTEN) if file.exists() and file.resolve() not in inputs]
     begun = scene.read_text(errors="replace") if scene.is_file() else ""
     if old and PROPOSED not in begun:
@@ -227,7 +229,7 @@ def begin_run(folder, operations, inputs):
     if old:
         print(f"removed from {folder}: files of an earlier run; {' and '.join(EDITED)} are renamed to old_…",
               flush=True)
-    scene.write_text(f"# {summarize(operations)}.\n# {PROPOSED}, {NOT_ENDED}.\n")
+    begun_scene.write(f"# {summarize(operations)}.\n# {PROPOSED}, {NOT_ENDED}.\n")
 
 
 def extract_labels(labels, folder, work, with_skin):
@@ -385,7 +387,7 @@ def main():
         whole if whole.exists() else folder / "skull.ply", "-mandible", folder / "mandible.ply", "-output", folder / "landmarks")
     bones = [name for name in ("skull", "maxilla", "mandible") if (folder / f"{name}.ply").exists()]
     scene = folder / "scene.yaml"
-    scene.write_text(scene_text(operations, options.edge, bones))
+    Target(scene, ".yaml").write(scene_text(operations, options.edge, bones))
     if options.propose:
         run(find_program("repose-solve"), scene, "-dry_run")
     picture = draw(HERE / "proposal.py", scene, "-output", folder / "proposal.png")

@@ -92,7 +92,8 @@ def test_a_missing_file_is_one_line(script, name):
 FOLDERS = {name: (["folder"], "folder") for name in ("report.py", "render.py", "map.py", "live.py", "proposal.py")}
 FOLDERS |= {"scene of report.py": (["r", "-scene", "folder"], "folder"),
             "scene of render.py": (["r", "-scene", "folder"], "-scene folder"),
-            "ending of report.py": (["folder/r"], "folder/r.h5"), "weights.py": (["folder", "-bin", "."], "./repose-solve")}
+            "ending of report.py": (["folder/r"], "folder/r.h5"),
+            "weights.py": (["folder", "-bin", "."], "./repose-solve")}
 
 
 @pytest.mark.quick
@@ -243,6 +244,14 @@ def test_a_file_in_place_of_the_folder_of_a_plan_is_refused(script, tmp_path):
         (tmp_path / name).touch()
     says(script("plan.py", "head.mhd", "-operation", "jaw, 5 mm forward"), "plan.py",
          "-output plan: is a file, not a folder; choose another name")
+
+
+@pytest.mark.parametrize("folder, part", [("/proc/x", "-output /proc/x: cannot be made: "),
+                                          ("/proc", "/proc/scene.yaml: cannot be written: ")])
+def test_a_folder_of_a_plan_that_cannot_be_written_is_refused_with_a_remedy(script, tmp_path, folder, part):
+    (tmp_path / "head.mhd").touch()
+    refused = script("plan.py", "head.mhd", "-operation", "jaw, 5 mm forward", "-output", folder)
+    says(refused, "plan.py", part, "; choose another ")
 
 
 def test_an_option_given_twice_is_named_with_both_values(script, solved, tmp_path):
