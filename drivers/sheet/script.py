@@ -4,11 +4,17 @@ package."""
 import argparse
 import contextlib
 import ctypes.util
+import errno
 import math
 import os
 import subprocess
 import sys
 import zlib
+
+
+REMEDIES = {errno.ENOSPC: "free some space or choose another folder",
+            errno.EFBIG: "free some space or choose another folder",
+            errno.ENAMETOOLONG: "choose a shorter name"}
 
 
 class Unusable(Exception):
@@ -50,7 +56,8 @@ def run(main):
     except Unusable as reason:
         refuse(reason)
     except OSError as reason:
-        refuse(f"{reason.filename}: {reason.strerror}" if reason.filename else reason)
+        told = f"{reason.filename}: {reason.strerror}" if reason.filename else reason
+        refuse("; ".join(filter(None, [str(told), REMEDIES.get(reason.errno)])))
     except KeyboardInterrupt:
         sys.exit(130)
 

@@ -1,15 +1,10 @@
 """Files that a script writes: complete or absent, and never one that it reads."""
 
 import contextlib
-import errno
 import io
 import os
 
-from sheet.script import Unusable
-
-REMEDIES = {errno.ENOSPC: "free some space or choose another folder",
-            errno.EFBIG: "free some space or choose another folder",
-            errno.ENAMETOOLONG: "choose a shorter name"}
+from sheet.script import REMEDIES, Unusable
 
 
 class Target:

@@ -385,16 +385,37 @@ from sheet.script import run
 from sheet.whole_file import Target
 run(lambda: Target(sys.argv[2], "").write(b"x" * 100_000))
 """
+SAVES = """import sys
+import numpy as np
+sys.path[:0] = [sys.argv[1], sys.argv[1] + "/python"]
+from repose.samples import Sample, SampleStore
+from sheet.script import run
+run(lambda: SampleStore(".", "key").save(Sample(np.zeros(2), np.zeros((10_000, 3)), np.zeros((2, 10_000, 3)), True)))
+"""
+
+
+def run_with_small_files(text, *arguments, folder):
+    """Runs Python's text where no file may be larger than 4 KiB."""
+    return subprocess.run([sys.executable, "-B", "-c", text, PROJECT / "drivers", *arguments], cwd=folder, text=True,
+                          capture_output=True,
+                          preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096)))
 
 
 @pytest.mark.parametrize("name, part", [("full.html", "File too large; free some space"),
                                         ("x" * 253, "File name too long; choose a shorter name")])
 def test_what_cannot_be_written_leaves_the_file_as_it_was(tmp_path, name, part):
     (tmp_path / name).write_text("old")
-    done = subprocess.run([sys.executable, "-B", "-c", FILLS, PROJECT / "drivers", name], cwd=tmp_path, text=True,
-                          capture_output=True, preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096)))
+    done = run_with_small_files(FILLS, name, folder=tmp_path)
     assert done.returncode == 1 and part in done.stderr and len(done.stderr.splitlines()) == 1, done
     assert os.listdir(tmp_path) == [name] and (tmp_path / name).read_text() == "old"
+
+
+@pytest.mark.quick
+def test_a_plan_of_the_map_that_cannot_be_kept_is_one_line(tmp_path):
+    done = run_with_small_files(SAVES, folder=tmp_path)
+    assert done.returncode == 1 and len(done.stderr.splitlines()) == 1, done
+    assert re.search(r"key/\w+\.npz: File too large; free some space or choose another folder$", done.stderr), done
+    assert os.listdir(tmp_path / "key") == []
 
 
 def places(y=0.0, z=0.0):

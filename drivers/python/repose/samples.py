@@ -3,6 +3,7 @@
 import contextlib
 import dataclasses
 import hashlib
+import io
 import os
 import pathlib
 import queue
@@ -97,11 +98,14 @@ class SampleStore:
     def save(self, sample):
         path = self.path(sample.u)
         part = path.with_suffix(f".{os.getpid()}.{threading.get_ident()}.part")
+        packed = io.BytesIO()  # an archive on a full disk complains again when it is destroyed
+        np.savez(packed, u=sample.u, displacement=sample.displacement.astype("f4"),
+                 slopes=sample.slopes.astype("f4"), converged=sample.converged)
         try:
-            with part.open("wb") as file:
-                np.savez(file, u=sample.u, displacement=sample.displacement.astype("f4"),
-                         slopes=sample.slopes.astype("f4"), converged=sample.converged)
+            part.write_bytes(packed.getvalue())
             part.replace(path)
+        except OSError as reason:  # that of a write names no file
+            raise OSError(reason.errno, reason.strerror, str(path)) from None
         finally:
             part.unlink(missing_ok=True)
 
