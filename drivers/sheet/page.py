@@ -12,7 +12,7 @@ from sheet.measures import (following, measured, occlusion, reference, shift_in_
                             turns_in_words)
 from sheet.profile import COLORS, complete, drawing, outlines
 from sheet.shown_skin import matching_rows, rows_of_patient
-from sheet.result import Figure
+from sheet.result import Figure, rigid
 from sheet.tables import folded, table, tenths
 from sheet.web_page import web_page
 from sheet.words import PUBLISHED, by_part, paragraphs
@@ -206,15 +206,15 @@ def spoken(name):
 
 
 def moved_bones(plan):
-    """[(name, place, shift there, rotation)] of the bones that move."""
+    """[(name, place, shift there, rotation)] of the bones that the plan moves, over the whole plan."""
     marks = {name: mark for name, standard in BONES.items() for mark in plan.placed
              if mark["name"] == standard}
     found = []
     for bone in plan.result.bones:
-        turn, shift = bone["motion"]
+        turn, shift = rigid(bone["before"], bone["planned"])
         place, point = reference(bone, marks)
         step = turn @ point + shift - point
-        if np.linalg.norm(bone["after"] - bone["before"], axis=1).max() > 0.005:
+        if np.linalg.norm(bone["planned"] - bone["before"], axis=1).max() > 0.005:
             found.append((spoken(bone["name"]), place, step, turn))
     return found
 
@@ -239,6 +239,9 @@ def plan_table(plans, frame):
             "yaw, °")
     page = table(("plan", *head) if len(plans) > 1 else head, rows) if rows else \
         "<p>No bone moves.</p>"
+    page += "".join(f'<p class="warning">The face of {html.escape(plan.name)} and its numbers are at '
+                    f'{100 * plan.result.end["load"]:.4g} % of its plan.</p>'
+                    for plan in plans if plan.result.end["load"] < 1)
     still = sorted({spoken(bone["name"]) for plan in plans for bone in plan.result.bones} -
                    {name for plan in plans for name, *_ in moved_bones(plan)})
     if still:

@@ -71,6 +71,7 @@ class Result:
     def read_bones(self, model, step):
         names = [text(name) for name in model["bone"][:]] if "bone" in model else []
         surfaces = model.get("bone_surface", {})
+        planned = read_transforms(model) if self.end["load"] < 1 else None
         self.bones, first = [], 0
         moved = read_places(step, "bone_surface/points") if "bone_surface/points" in step else None
         for b, name in enumerate(names):
@@ -80,7 +81,8 @@ class Result:
             faces = read_rows(surfaces, f"{b}/triangles", len(points))
             after = points if moved is None else moved[first:first + len(points)]
             first += len(points)
-            self.bones.append({"name": name, "corners": faces, "before": points, "after": after,
+            goal = after if planned is None else points @ planned[b, :3, :3].T + planned[b, :3, 3]
+            self.bones.append({"name": name, "corners": faces, "before": points, "after": after, "planned": goal,
                                "motion": rigid(points, after)})
 
     def read_summary(self, h5):
@@ -99,7 +101,7 @@ class Result:
         self.cautions = [(name, before, None if place is None else axes @ place, after)
                          for name, before, place, after in self.cautions]
         for bone in self.bones:
-            bone["before"], bone["after"] = bone["before"] @ axes.T, bone["after"] @ axes.T
+            bone.update({state: bone[state] @ axes.T for state in ("before", "after", "planned")})
             bone["motion"] = rigid(bone["before"], bone["after"])
 
     def read_uncertainty(self, step, used):
@@ -111,6 +113,16 @@ class Result:
             values = error + step["point/discretisation_error"][:][used]
             near = matching_rows(self.solved, self.skin)
             self.uncertainty = np.where(self.skin.solved > 0, values[near], 0.0)
+
+
+def read_transforms(model):
+    """The whole planned motion [bones, 4, 4]; None where it is not stored."""
+    if "bone_transform" not in model:
+        return None
+    found = model["bone_transform"][:]
+    if not np.isfinite(found).all():
+        raise ValueError("bone_transform holds numbers that are not finite")
+    return found
 
 
 def rigid(before, after):

@@ -522,6 +522,19 @@ def test_a_rest_position_on_the_way_is_no_answer_of_the_model(report, opened, tm
     assert "answer of the model" not in page.text["b"] and "its accuracy" not in page.text["p"]
 
 
+def test_an_unfinished_face_is_shown_with_the_whole_plan(report, opened, tmp_path):
+    shutil.copy(opened, tmp_path / "part.h5")
+    with h5py.File(tmp_path / "part.h5", "r+") as h5:
+        step = h5["step"][sorted(h5["step"])[-1]]
+        step.attrs["load"] = 0.0
+        step["bone_surface/points"][...] = h5["model/bone_surfaces/points"]
+    page = page_of(report, tmp_path, tmp_path / "part.h5", "-landmarks", MARKS)
+    whole = page_of(report, tmp_path, opened, "-landmarks", MARKS)
+    assert page.rows["mandible"] == whole.rows["mandible"]
+    assert "The face of part and its numbers are at 0 % of its plan." in page.text["p"]
+    assert "at 0 %" not in whole.text["p"] and "No bone moves" not in page.text["p"]
+
+
 def test_mistakes_are_one_line(report, opened, tmp_path):
     (tmp_path / "bad.json").write_text("{")
     (tmp_path / "none.h5").write_bytes(b"")

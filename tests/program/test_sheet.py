@@ -330,9 +330,9 @@ def test_measures_of_the_profile_do_not_depend_on_the_side():
 
 def test_a_bone_of_several_words_that_moves_is_no_bone_that_stays():
     before = np.array([[0.0, 0, 0], [10, 0, 0], [0, 10, 0]])
-    bones = [{"name": name, "before": before, "after": before + shift, "motion": (np.eye(3), np.array(shift))}
+    bones = [{"name": name, "before": before, "planned": before + shift}
              for name, shift in (("upper_jaw", (0, -5, 0)), ("lower_jaw", (0, 0, 0)))]
-    plan = SimpleNamespace(name="plan", placed=[], bones={}, result=SimpleNamespace(bones=bones))
+    plan = SimpleNamespace(name="plan", placed=[], bones={}, result=SimpleNamespace(bones=bones, end={"load": 1}))
     assert "Does not move: lower jaw." in plan_table([plan], "the scan")
 
 
