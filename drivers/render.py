@@ -619,6 +619,9 @@ def main():
     for result, name in zip(results, own_names(chosen.names)):
         result.name = name
     if chosen.scene:
+        from sheet.scene import require_same_bones  # needs PyYAML
+        require_same_bones(chosen.scene, {result.file: [name.decode() for name in result.model.get("bone", ())]
+                                          for result in results})
         for result in results:
             result.instruments = read_instruments(chosen.scene)
     states = [state_of(result, chosen) for result in results]

@@ -57,6 +57,9 @@ def main():
     norms = measures.read_norms(chosen.norms)
     marks = landmarks.read_landmarks(chosen.landmarks) if chosen.landmarks else {}
     results = [Result(f"{name}.h5") for name in chosen.names]
+    if chosen.scene:
+        from sheet.scene import require_same_bones  # needs PyYAML
+        require_same_bones(chosen.scene, {result.file: result.bone_names for result in results})
     landmarks.require_same_head(results[0], marks, chosen.landmarks)
     axes, frame = landmarks.head_axes(marks)
     appearance = read_appearance(chosen.skin, results[0].skin) if chosen.skin else None

@@ -69,7 +69,7 @@ class Result:
                             Figure(f"{step.attrs['penetration']:.2g}")}
 
     def read_bones(self, model, step):
-        names = [text(name) for name in model["bone"][:]] if "bone" in model else []
+        self.bone_names = names = [text(name) for name in model["bone"][:]] if "bone" in model else []
         surfaces = model.get("bone_surface", {})
         planned = read_transforms(model) if self.end["load"] < 1 else None
         self.bones, first = [], 0

@@ -64,6 +64,23 @@ def named_file(file, key):
     return None
 
 
+def bones_of(file):
+    """The names of a scene's bones and of the pieces cut off them; none where it has no bones."""
+    scene = read_scene(file)
+    with reading(file, "a scene that repose-solve takes"):
+        bones = [entry["name"] for entry in scene.get("bones") or []]
+        return {*bones, *(cut["piece"] for cut in scene.get("osteotomies") or [])} if bones else set()
+
+
+def require_same_bones(file, results):
+    """Refuses a scene with other bones and pieces than each of the results {name: names of its bones}."""
+    bones = bones_of(file)
+    if bones and bones not in [set(names) for names in results.values()]:
+        known = "; ".join(f"of {name}: {', '.join(sorted(names))}" for name, names in results.items())
+        raise Unusable(f"{file}: another plan's scene: its bones and pieces are {', '.join(sorted(bones))}; those "
+                       f"{known}; give the scene that was solved, or leave it out")
+
+
 def without_moves(root, text):
     """The lines of a scene without its moves, the number of its first key's line, and how far its keys are indented."""
     lines, last = text.splitlines(), root.end_mark

@@ -80,6 +80,13 @@ def accuracy(result):
         rows)
 
 
+def is_scene_of(scene, result):
+    """Returns whether the bones and pieces of a scene are those of a result."""
+    from sheet.scene import bones_of  # needs PyYAML
+    bones = bones_of(scene)
+    return not bones or bones == set(result.bone_names)
+
+
 def provenance(result, scene):
     file = pathlib.Path(result.file)
     written = datetime.datetime.fromtimestamp(file.stat().st_mtime).strftime("%Y-%m-%d %H:%M")
@@ -90,7 +97,7 @@ def provenance(result, scene):
             ("λ", f"{result.end['lambda']:g}"),
             *((name, str(count)) for name, count in result.counts.items())]
     page = table(("", ""), rows)
-    if scene:
+    if scene and is_scene_of(scene, result):
         written = pathlib.Path(scene).read_text(encoding="utf-8-sig")
         page += f"<h3>{html.escape(os.path.basename(scene))}</h3><pre>{html.escape(written)}</pre>"
     return page

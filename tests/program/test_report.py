@@ -506,6 +506,20 @@ def test_the_scene_is_shown_and_names_the_landmarks(report, opened, tmp_path):
     assert page.text["pre"] == scene and "pogonion bone" in page.rows
 
 
+def test_the_scene_of_another_plan_is_refused(report, opened, tmp_path):
+    other = PROJECT / "meshes/head_genioplasty.yaml"
+    refused = report(opened, "-scene", other)
+    assert refused.returncode == 1 and len(refused.stderr.splitlines()) == 1, refused
+    assert (f"{other}: another plan's scene: its bones and pieces are chin, mandible, skull; those of {opened}: "
+            "mandible, skull; give the scene that was solved") in refused.stderr
+    shutil.copy(opened, tmp_path / "chin.h5")
+    with h5py.File(tmp_path / "chin.h5", "r+") as h5:
+        del h5["model/bone"]
+        h5["model/bone"] = ["skull", "mandible", "chin"]
+    page = page_of(report, tmp_path, opened, tmp_path / "chin.h5", "-scene", other)
+    assert page.text["pre"] == other.read_text(), "in the fold of its own result alone"
+
+
 def test_a_bad_end_is_warned_of(report, run, tmp_path):
     assert run("repose-solve", SCENE, "-time_limit", 0, "-output", "cut").returncode == 2
     page = page_of(report, tmp_path, tmp_path / "cut.h5")
