@@ -139,9 +139,17 @@ def test_the_gradient_of_a_point_is_the_transpose_of_the_tangents(coarse):
 def test_refusals_name_the_place_and_the_session_goes_on(coarse):
     for plan, words in ((({"mandible": {"translate": [0, -9, 0]}}), "'mandible': translation -9 mm"),
                         (({"jaw": {}}), "'jaw' is no piece"),
-                        (({"chin": {"turn": [0, 0, 1]}}), "no member 'turn'")):
+                        (({"chin": {"turn": [0, 0, 1]}}), "'chin': turn: a motion has translate and rotate"),
+                        (None, "a plan is {PIECE: {'translate': [x, y, z], 'rotate': [x, y, z]}}, not None"),
+                        ([], "a plan is "), ("chin", "a plan is "), ({"chin": None}, "'chin': a motion is "),
+                        ({"chin": [0, 0, 1]}, "'chin': a motion is "),
+                        ({"chin": {"translate": [True, 0, 0]}}, "three finite numbers, not [True, 0, 0]"),
+                        ({"chin": {"translate": "123"}}, "translate must be three finite numbers, not 123")):
         with pytest.raises(repose.Refused, match=re.escape(words)):
             coarse.solve(plan)
+    for accuracy in (float("nan"), True, "fine", 100, 1e-9):
+        with pytest.raises(repose.Refused, match="accuracy must be a number"):
+            coarse.solve(A, accuracy)
     for request in ({"do": "dance"}, {"do": "solve", "plan": 3}, {"do": "solve", "accuracy": -1},
                     {"do": "solve", "plan": {"chin": {"translate": [0, 1]}}}, {"do": "write"},
                     {"do": "solve", "tangents": "yes"}, {"do": "solve", "gradient_of": []},
@@ -159,9 +167,11 @@ def test_refusals_name_the_place_and_the_session_goes_on(coarse):
 
 def test_a_request_that_is_no_line_of_json_is_refused(session):
     """None of them waits for an answer without end."""
-    for value, words in ((float("nan"), "finite numbers only"), (float("inf"), "finite numbers only")):
-        with pytest.raises(repose.Refused, match=words):
+    for value in (float("nan"), float("inf")):
+        with pytest.raises(repose.Refused, match="finite numbers, not"):
             session.solve({"mandible": {"translate": [0, value, 0]}})
+        with pytest.raises(repose.Refused, match="finite numbers only"):
+            session.solve(A, gradient_of={0: [value, 0, 0]})
     with pytest.raises(repose.Refused, match="a line of at most 1048576 bytes"):
         session.solve(A, gradient_of={row: [0.125, -1, 0] for row in range(30_000)})
     with pytest.raises(repose.Refused, match="nests at most 8 arrays and objects"):

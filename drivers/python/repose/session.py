@@ -7,6 +7,7 @@ import os
 import pathlib
 import subprocess
 import threading
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -21,15 +22,22 @@ class Refused(ValueError):
     """Raised with the message of repose-live for a request that it does not answer."""
 
 
+def is_number(value):
+    """Returns whether a value is a finite number, and not true or false."""
+    return isinstance(value, numbers.Real) and not isinstance(value, bool) and bool(np.isfinite(value))
+
+
 def vectors_of(piece, motion):
-    """A piece's motion in a plan with both its vectors; ValueError where it is none."""
+    """A piece's motion in a plan with both its vectors; Refused where it is none."""
+    if not isinstance(motion, Mapping):
+        raise Refused(f"{piece!r}: a motion is {{'translate': [x, y, z], 'rotate': [x, y, z]}}, not {motion!r}")
     if unknown := motion.keys() - {"translate", "rotate"}:
-        raise ValueError(f"{piece!r}: {', '.join(sorted(unknown))}: a motion has translate and rotate")
+        raise Refused(f"{piece!r}: {', '.join(sorted(map(str, unknown)))}: a motion has translate and rotate")
     vectors = {key: motion.get(key, (0, 0, 0)) for key in ("translate", "rotate")}
     for key, vector in vectors.items():
         if not (isinstance(vector, (list, tuple, np.ndarray)) and len(vector) == 3 and
-                all(isinstance(number, numbers.Real) and np.isfinite(number) for number in vector)):
-            raise ValueError(f"{piece!r}: {key} must be three finite numbers, not {vector}")
+                all(map(is_number, vector))):
+            raise Refused(f"{piece!r}: {key} must be three finite numbers, not {vector}")
     return vectors
 
 
@@ -206,7 +214,7 @@ class Session:
 
     def solve(self, plan, accuracy=None, tangents=False, base="scene", gradient_of=None,
               other_rest=False, summary=False):
-        """The face for a plan, to `accuracy` mm (the scene's). `base` is where the search begins:
+        """The face for a plan, to `accuracy` mm, 1e-6 … 10 (the scene's). `base` is where the search begins:
         "scene", the plan of the scene's moves, "rest", the initial state, or another plan. `gradient_of`
         {row: [x, y, z]}: weights of points of the skin, by the derivatives of whose sum Σ w · x the face
         has a `gradient`. With `other_rest` the search begins at the initial state and looks for another
@@ -219,6 +227,8 @@ class Session:
         if summary:
             request["summary"] = True
         if accuracy is not None:
+            if not is_number(accuracy):
+                raise Refused(f"accuracy must be a number of mm, 1e-6 … 10, not {accuracy!r}")
             request["accuracy"] = float(accuracy)
         if gradient_of:
             request["gradient_of"] = [{"point": int(row), "weight": [float(w) for w in weight]}
@@ -359,7 +369,7 @@ class Session:
             try:
                 line = json.dumps({**request, "id": number}, allow_nan=False)
             except ValueError as reason:
-                raise Refused(f"the request is no JSON, which has finite numbers only: {reason}") from None
+                raise Refused(f"a request holds texts, lists and finite numbers only: {reason}") from None
             self._waiting[number] = waiting
             try:
                 self._process.stdin.write(line.encode() + b"\n")
@@ -400,5 +410,9 @@ def without_mpi(environment):
 
 
 def _plain(plan):
-    return {piece: {key: [float(value) for value in values] for key, values in motion.items()}
+    """A plan as JSON holds it; Refused where it is none."""
+    if not isinstance(plan, Mapping):
+        raise Refused(f"a plan is {{PIECE: {{'translate': [x, y, z], 'rotate': [x, y, z]}}}}, not {plan!r}")
+    vectors = {piece: vectors_of(piece, motion) for piece, motion in plan.items()}
+    return {piece: {key: [float(value) for value in vectors[piece][key]] for key in motion}
             for piece, motion in plan.items()}
