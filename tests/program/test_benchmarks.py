@@ -134,6 +134,22 @@ def test_a_halved_model_is_the_same_body(run, environment, tmp_path, layers):
     assert 0.02 < apart.mean() < 0.1 * np.linalg.norm(moved[0][skin[0]], axis=1).mean()
 
 
+@pytest.mark.quick
+def test_the_page_of_plans_holds_the_operations_and_what_runs_print():
+    import plans
+    page = (PROJECT / "docs/start/from_ct.md").read_text()
+    for mark, _, operations in plans.HEADS.values():
+        table = page.partition(f"<!-- {mark} -->\n\n{plans.HEAD}\n")[2].partition(f"\n<!-- end of {mark} -->\n")[0]
+        assert re.findall(r"^\| (.+?) \| 0 \| [A-Z]", table, re.M) == operations
+    summary = ["Chin 4.9 mm back; nose 0.3 mm down; largest movement 5.1 mm (at (1, 2, 3)). Within 0.02 mm of rest.",
+               "  warning                bones 'skull' and 'jaw' end 3.0 mm inside one another; repose-collide …",
+               "  accuracy               0.0216 mm reached, 0.1 mm requested",
+               "  pierced by bone        2 prisms", "  pierced by bone        3 columns"]
+    assert plans.row_of("jaw, 5 mm back", 0, summary) == \
+        "| jaw, 5 mm back | 0 | Chin 4.9 mm back; nose 0.3 mm down | bones 'skull' and 'jaw' end 3.0 mm inside one " \
+        "another; *pierced by bone* |"
+
+
 def test_the_cookbook_holds_its_recipes(environment, tmp_path):
     page, count = tmp_path / "page.md", r"\| (\d+) \| (\d+) \| (\d+) \| ([\d.]+) \|"
     page.write_text("<!-- measured -->\n<!-- end of measured -->\nrest\n")
