@@ -32,7 +32,8 @@ std::vector<base::Option> option_table() {
           {"radius", OptionKind::number, "", "The plane cuts only this near to its point.",
            base::Range::between(1e-6, 1e6), "mm"},
           {"surface", OptionKind::path, "",
-           "A cutting surface (PLY, STL, OBJ, OFF) in place of the plane."},
+           "A cutting surface (PLY, STL, OBJ, OFF), in place of the plane or with it: the piece is "
+           "beyond both."},
           {"kerf", OptionKind::number, "0", "Thickness of the saw blade.",
            base::Range::between(0, 20), "mm"},
           triple("seed", "A point inside the piece, which then chooses it."),

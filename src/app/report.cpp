@@ -36,10 +36,10 @@ std::string halved(const solve::Halvings& h) {
 }
 
 std::string work_rows(const solve::Summary& s, bool springs) {
-  const std::string other =
-      s.evaluations_for_other > 0
-          ? fmt::format("; {} of value to find another rest position", s.evaluations_for_other)
-          : "";
+  const std::string other = s.evaluations_for_other > 0
+                                ? fmt::format("; of the {}, {} to find another rest position",
+                                              s.evaluations, s.evaluations_for_other)
+                                : "";
   return report_row("load steps", "{} ({})", s.path.steps, halved(s.path.halvings)) +
          describe_halvings(s.path.halvings, springs) +
          report_row("iterations", "{}", s.path.iterations) +
@@ -220,8 +220,9 @@ std::string describe_contact(const std::vector<std::string>& bodies, const solve
                          "{:.1f} mm; they go no deeper",
                          on.inside, on.deepest, name, on.where);
     if (on.points == 0) continue;
-    text += report_row("contact", "{} points press on {} with {:.4g} N, {:.4g} N", on.points, name,
-                       on.force, on.force.norm());
+    text += report_row("contact", "{} {} on {} with {:.4g} N, {:.4g} N", on.points,
+                       on.points == 1 ? "point presses" : "points press", name, on.force,
+                       on.force.norm());
     if (on.skin.points > 0)
       text +=
           report_row("skin on bone",

@@ -358,10 +358,11 @@ Keys plan_keys() {
       {"plan.pieces", texts, "required", "The bones or pieces; no other bone may move."},
       {"plan.box", map, "", "Ranges of the motions, both ways: a rotation, then a translation."},
       {"plan.box.translate", vector, "[10, 10, 10]",
-       "Largest components of the translation of a piece's centroid.", "mm"},
+       "Largest components of the translation of a piece's centroid.", "mm",
+       base::Range::between(0, 100)},
       {"plan.box.rotate", vector, "[10, 10, 10]",
        "Largest components of the rotation vector (axis times angle) about its centroid.",
-       "degrees"}};
+       "degrees", base::Range::between(0, 90)}};
 }
 
 Keys solve_keys() {
@@ -559,7 +560,8 @@ std::string expected(const Key& key) {
     case numbers:
       return fmt::format("a list, each {}", base::expected_number(false, key.unit, key.range, {}));
     case vector:
-      return fmt::format("three numbers [x, y, z]{}{}", key.unit.empty() ? "" : " of ", key.unit);
+      return fmt::format("three numbers [x, y, z]{}{}{}{}", key.unit.empty() ? "" : " of ",
+                         key.unit, key.range.text().empty() ? "" : ", each ", key.range.text());
     case choice:
       return fmt::format("one of {}", fmt::join(key.choices, ", "));
     case text:

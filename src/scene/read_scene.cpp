@@ -235,18 +235,8 @@ Collision read_collision(const Value& value) {
   return collision;
 }
 
-Vec3 read_range(const Map& box, const std::string& name, const Vec3& standard, double largest) {
-  const auto value = box.find(name);
-  if (!value) return standard;
-  const Vec3 range = value->vector();
-  if (range.minCoeff() < 0 || range.maxCoeff() > largest)
-    value->refuse("must be three numbers of 0 … {}", largest);
-  return range;
-}
-
 /// After the moves, which must lie within the plan's pieces.
 Plan read_plan(const Value& value, const Scene& scene) {
-  constexpr double longest = 100, widest = 90;  // mm, degrees
   const Map map(value);
   Plan plan;
   for (const auto& [name, place] : map.at("pieces").texts())
@@ -259,8 +249,8 @@ Plan read_plan(const Value& value, const Scene& scene) {
                               scene.bones[b].name);
   if (const auto box = map.find("box")) {
     const Map ranges(*box);
-    plan.translate = read_range(ranges, "translate", plan.translate, longest);
-    plan.rotate = read_range(ranges, "rotate", plan.rotate, widest);
+    set(plan.translate, ranges, "translate", &Value::vector);
+    set(plan.rotate, ranges, "rotate", &Value::vector);
   }
   if (scene.collision && scene.collision->mode == CollisionMode::clamp)
     value.refuse("and collision.mode: clamp exclude each other, as that changes the moves");
