@@ -163,25 +163,25 @@ std::vector<Vec3> steps_around() {
 
 }  // namespace
 
-/// The gap to first order of a constraint's point to the nearest tangent plane of its body around
-/// it, at most 2 mm deep, whose normal is more than 60° from the one at the latest update.
-std::optional<LinearGap> BodyContact::gap_round_edge(size_t c,
-                                                     std::span<const Vec3> position) const {
+/// The gaps to first order of a constraint's point to tangent planes of its body around it, at most
+/// 2 mm deep, whose normals are more than 60° from the one at the latest update.
+std::vector<LinearGap> BodyContact::gaps_round_edge(size_t c,
+                                                    std::span<const Vec3> position) const {
   constexpr double deepest = 2, largest_cosine = 0.5;
   static const std::vector<Vec3> steps = steps_around();
   const RigidBody& body = bodies_[pairs_.body[c]];
   const auto point = static_cast<int32_t>(pairs_.point[c]);
   const Vec3 beside = body.beside(position[point]);
-  std::optional<LinearGap> nearest;
+  std::vector<LinearGap> gaps;
   for (const Vec3& step : steps) {
     const surface::Distance there = body.distance(beside + body.own_direction(step));
     if (std::abs(there.value) > step.norm() || !(there.gradient.dot(normal_[c]) < largest_cosine))
       continue;
     const double gap = there.value - there.gradient.dot(step) - pairs_.offset[c];
-    if (gap < 0 && gap > (nearest ? nearest->gap : -deepest))
-      nearest = {c, false, pairs_.area[c], gap, {{point, there.gradient.normalized()}}, {}};
+    if (gap < 0 && gap > -deepest)
+      gaps.push_back({c, false, pairs_.area[c], gap, {{point, there.gradient.normalized()}}, {}});
   }
-  return nearest;
+  return gaps;
 }
 
 std::set<int32_t> BodyContact::bodies_near_edges(std::span<const Vec3> position) const {
@@ -189,7 +189,7 @@ std::set<int32_t> BodyContact::bodies_near_edges(std::span<const Vec3> position)
   for (size_t c = 0; c < pairs_.point.size(); ++c) {
     const bool touches = multiplier_[c] > 0 || slides(c);
     if (!touches || normal_[c].isZero(0) || found.contains(pairs_.body[c])) continue;
-    if (gap_round_edge(c, position)) found.insert(pairs_.body[c]);
+    if (!gaps_round_edge(c, position).empty()) found.insert(pairs_.body[c]);
   }
   return found;
 }
@@ -198,7 +198,7 @@ std::vector<LinearGap> BodyContact::other_sides(std::span<const Vec3> position) 
   std::vector<LinearGap> found;
   for (size_t c = 0; c < pairs_.point.size(); ++c) {
     if (multiplier_[c] <= 0 || slides(c) || normal_[c].isZero(0)) continue;
-    if (const auto gap = gap_round_edge(c, position)) found.push_back(*gap);
+    std::ranges::move(gaps_round_edge(c, position), std::back_inserter(found));
   }
   return found;
 }
@@ -206,8 +206,10 @@ std::vector<LinearGap> BodyContact::other_sides(std::span<const Vec3> position) 
 std::vector<LinearGap> BodyContact::ways_out(std::span<const Vec3> position) const {
   std::vector<LinearGap> found;
   for (const auto& [first, second] : overlapped()) {
-    const auto one = gap_round_edge(first, position), other = gap_round_edge(second, position);
-    if (one || other) found.push_back(!other || (one && one->gap >= other->gap) ? *one : *other);
+    std::vector<LinearGap> ways = gaps_round_edge(first, position);
+    std::ranges::move(gaps_round_edge(second, position), std::back_inserter(ways));
+    const auto nearest = std::ranges::max_element(ways, {}, &LinearGap::gap);
+    if (nearest != ways.end()) found.push_back(*nearest);
   }
   return found;
 }

@@ -47,7 +47,8 @@ double softness(const mechanics::LinearGap& other, const Mat3& compliance, const
 
 /// Returns the sides, of this rank's points, that may have less energy than those pressed on at
 /// `displacement`, where the objective was updated last: in a model of one point, whose compliance
-/// is a few times the inverse of its block of the Hessian. Softness ascends. Collective.
+/// is a few times the inverse of its block of the Hessian. Softness ascends; of the sides of one
+/// constraint it is the softest. Collective.
 std::vector<OtherSide> promising_sides(discrete::Objective& objective, discrete::Tangent& tangent,
                                        Vec displacement) {
   constexpr double softest = 4;
@@ -62,6 +63,8 @@ std::vector<OtherSide> promising_sides(discrete::Objective& objective, discrete:
     if (s > 0 && s < softest) found.push_back({std::move(gap), s});
   }
   std::ranges::sort(found, {}, &OtherSide::softness);
+  std::set<size_t> seen;
+  std::erase_if(found, [&](const OtherSide& s) { return !seen.insert(s.gap.constraint).second; });
   return found;
 }
 
@@ -216,7 +219,7 @@ bool OtherRestSearch::change_sides(Vec displacement, double accuracy, std::set<s
   constexpr int max_failed = 3;  // in a row
   constexpr double none = std::numeric_limits<double>::infinity();
   discrete::Positions& positions = objective_.positions();
-  programs_.evaluate(displacement);
+  double value = programs_.evaluate(displacement);
   std::vector<OtherSide> sides = promising_sides(objective_, tangent_, displacement);
   std::erase_if(sides, [&](const OtherSide& s) { return tried.contains(s.gap.constraint); });
   size_t next = 0;
@@ -233,7 +236,9 @@ bool OtherRestSearch::change_sides(Vec displacement, double accuracy, std::set<s
     int64_t iterations = 0;
     if (end == End::reached) there = descent_.finish_reached(start_, accuracy, iterations);
     there.iterations += iterations;
-    if (there.converged && pierced(start_) <= pierced(displacement)) {
+    if (there.converged && is_less(there.objective, value) &&
+        pierced(start_) <= pierced(displacement)) {
+      value = there.objective;
       take_other(displacement, accuracy, there, outcome);
       changed = true;
       failed = -1;

@@ -89,9 +89,9 @@ class BodyContact {
              std::vector<LinearGap>& gaps) const;
   /// Returns the bodies on which points press or slide near edges, ascending. At the latest update.
   std::set<int32_t> bodies_near_edges(std::span<const Vec3> position) const;
-  /// Gaps to first order of points that press on a body near an edge of it, from the body's side
-  /// round that edge: negative, at most 2 mm, from a plane more than 60° from the one pressed on.
-  /// At most one a constraint. At the latest update.
+  /// Gaps to first order of points that press on a body near an edge of it, from the body's sides
+  /// round that edge: negative, at most 2 mm, from planes more than 60° from the one pressed on,
+  /// those of a constraint one after the other. At the latest update.
   std::vector<LinearGap> other_sides(std::span<const Vec3> position) const;
   /// Calls visit(point, block) for the curvature −a p ∇²φ of the multipliers at gaps just made.
   template <class Visit>
@@ -115,7 +115,7 @@ class BodyContact {
   /// Lets released constraints act again.
   void restore_released() { released_.assign(released_.size(), 0); }
   /// Gaps to first order, as those of other_sides(), of points that release_overlapped() would
-  /// release: for each the less deep of its two bodies' sides round an edge, if there is one.
+  /// release: for each the least deep of its two bodies' sides round an edge, if there is one.
   std::vector<LinearGap> ways_out(std::span<const Vec3> position) const;
   /// Returns how many constraints are released, of this rank.
   int64_t count_released() const { return std::ranges::count(released_, char{1}); }
@@ -134,7 +134,7 @@ class BodyContact {
   Pressing now(size_t c) const {
     return released(c) ? Pressing{} : press(gap_[c], multiplier_[c], stiffness_, slides(c));
   }
-  std::optional<LinearGap> gap_round_edge(size_t c, std::span<const Vec3> position) const;
+  std::vector<LinearGap> gaps_round_edge(size_t c, std::span<const Vec3> position) const;
   void measure(size_t c, const Vec3& beside);
   bool measure_within(double reach, double smoothed_to, size_t c, const Vec3& beside);
   void set(size_t c, const Vec3& beside, const surface::Distance& distance);
