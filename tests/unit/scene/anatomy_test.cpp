@@ -254,6 +254,13 @@ TEST(ClinicalMove, TurnsWithTheHead) {
         digits);
 }
 
+TEST(ClinicalMove, NoAngleOutOfRangeIsAdvised) {
+  const std::string line =
+      refused(head(), le_fort + "moves: [{bone: maxilla, clinical: {yaw: -45.5}}]\n");
+  EXPECT_NE(line.find("-45 … 45, it is '-45.5'"), std::string::npos) << line;
+  EXPECT_EQ(line.find("write"), std::string::npos) << line;
+}
+
 TEST(OsteotomyTemplate, ExcludesCutsOfOnesOwn) {
   const std::string both =
       "osteotomies: [{bone: skull, piece: a, template: le_fort_1, planes: [{point: [0, 0, 0], "

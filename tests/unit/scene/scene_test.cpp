@@ -81,12 +81,6 @@ TEST(Scene, PlanRefusesWhatItDoesNotHold) {
             std::string::npos);
 }
 
-TEST(Scene, NoAngleOutOfRangeIsAdvised) {
-  const std::string line = refused(minimal + "moves: [{bone: skull, clinical: {yaw: -45.5}}]\n");
-  EXPECT_NE(line.find("-45 … 45"), std::string::npos) << line;
-  EXPECT_EQ(line.find("write"), std::string::npos) << line;
-}
-
 TEST(Scene, TableHasTheDefaultsOfTheCode) {
   const Scene plain = read(minimal);
   const auto standard = [](const char* path) { return find_key(path).standard; };
