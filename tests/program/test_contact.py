@@ -160,7 +160,7 @@ def test_points_go_round_edges_from_rest_positions_of_hardly_more_energy_too(fol
 
 
 def test_tissue_that_starts_among_soft_bodies_ends_at_less_energy(folder, environment):
-    """The other starts end 0.49 mm away, at 11.6420 N mm."""
+    """Without that start the search ends at 11.6335 N mm."""
     scene = (folder / "head_genioplasty.yaml").read_text()
     moves = ("  - {bone: chin, translate: [0.59, -2.35, -2.5]}\n"
              "  - {bone: mandible, translate: [1.28, -2.18, 2.08]}\n")
@@ -169,7 +169,7 @@ def test_tissue_that_starts_among_soft_bodies_ends_at_less_energy(folder, enviro
         done = runner(folder, environment)("repose-solve", "soft.yaml", "-accuracy", 0.01, "-output", "soft",
                                            ranks=ranks)
         assert (done.returncode, done.stderr) == (0, ""), done
-        assert last(folder / "soft.h5")["objective"] == pytest.approx(11.6392, abs=5e-4)
+        assert last(folder / "soft.h5")["objective"] == pytest.approx(11.6307, abs=5e-4)
 
 
 def solve_implant(folder, environment, half_axes, center, forward):
