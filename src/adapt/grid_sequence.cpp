@@ -127,7 +127,7 @@ class SequenceSolver {
 
   /// Carries the answer of a level to the scene's points. On rank 0.
   void store(model::BuiltModel&& built, std::vector<Vec3>&& position, Level& level) {
-    level.points = static_cast<int64_t>(position.size());
+    level.points = std::ssize(position);
     if (level.resolution.edge == 0) level.resolution.edge = meshtools::even_edge(anatomy_.skin);
     const auto moved = sum(position, built.model.points.position, -1);
     std::vector<Vec3> carried = sum(fine_.points.position, transfer(built.model, fine_, moved), 1);

@@ -19,7 +19,7 @@ std::vector<std::array<Vec3, 3>> closings_of_holes(const std::vector<Vec3>& poin
                                                    const std::vector<Triangle>& triangles) {
   constexpr double widest = 12;  // mm, diagonal of the box around a rim
   const surface::EdgeTable edges(triangles);
-  surface::UnionFind rims(static_cast<int64_t>(points.size()));
+  surface::UnionFind rims(std::ssize(points));
   std::vector<surface::HalfEdge> rim_edges;
   for (int64_t e = 0; e < edges.edges(); ++e) {
     if (edges[e].size() != 1) continue;

@@ -116,7 +116,7 @@ Volume read_dicom(const std::filesystem::path& folder, const Watch& watch) {
   std::vector<DicomSlice> slices = find_slices(folder);
   check_one_series(slices, folder.string());
   const DicomSlice first = slices.front();
-  const int64_t count = static_cast<int64_t>(slices.size()), frames = first.frames();
+  const int64_t count = std::ssize(slices), frames = first.frames();
   if ((count == 1) == (frames == 1))
     base::refuse("{}: holds {} file(s) of {} slice(s); a volume is one series of slices",
                  folder.string(), count, frames);

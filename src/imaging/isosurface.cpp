@@ -111,7 +111,7 @@ class Marching {
                static_cast<double>(from[2]));
     index[axis] += std::clamp(share, nearest_to_end, 1 - nearest_to_end);
     surface_.points.push_back(volume_.origin + volume_.axes * index);
-    return static_cast<int64_t>(surface_.points.size()) - 1;
+    return std::ssize(surface_.points) - 1;
   }
 
   /// The cubes between rows j and j + 1 of the two slices.

@@ -18,7 +18,7 @@ Mask largest_part(const Volume& volume, double level) {
     seen[voxel] = 1;
     part.push_back(voxel);
   };
-  for (int64_t first = 0; first < static_cast<int64_t>(seen.size()); ++first) {
+  for (int64_t first = 0; first < std::ssize(seen); ++first) {
     part.clear();
     add(first);
     for (size_t next = 0; next < part.size(); ++next) volume.visit_neighbors(part[next], add);
@@ -42,7 +42,7 @@ void widen(const Volume& volume, int axis, int64_t reach, Mask& mask) {
         mask[voxel] = 1;
     }
   };
-  for (int64_t voxel = 0; voxel < static_cast<int64_t>(mask.size()); ++voxel) {
+  for (int64_t voxel = 0; voxel < std::ssize(mask); ++voxel) {
     if (voxel / step[axis] % volume.size[axis] != 0) continue;
     pass(voxel, step[axis]);
     pass(voxel + (volume.size[axis] - 1) * step[axis], -step[axis]);

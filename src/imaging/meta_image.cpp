@@ -75,7 +75,7 @@ void check_count(const std::filesystem::path& file, int64_t named, int64_t count
 /// Names of files, a line each, behind the header; ITK leaves out a last line that has no end.
 void check_list(const std::filesystem::path& file, const MetaHeader& header, const Image& image) {
   const auto words = base::words(header.data);
-  const auto dimensions = static_cast<int64_t>(image.size.size());
+  const auto dimensions = std::ssize(image.size);
   int64_t of_file = words.size() > 1 ? base::parse_integer(words[1]).value_or(0) : 0;
   if (of_file <= 0 || of_file >= dimensions) of_file = dimensions - 1;
   int64_t count = 1;
@@ -83,10 +83,10 @@ void check_list(const std::filesystem::path& file, const MetaHeader& header, con
   std::vector<std::string> names;
   std::ifstream in(file, std::ios::binary);
   in.seekg(header.bytes);
-  for (std::string line; static_cast<int64_t>(names.size()) <= count && std::getline(in, line);)
+  for (std::string line; std::ssize(names) <= count && std::getline(in, line);)
     if (const std::string name = base::trimmed(line); !in.eof() && !name.empty())
       names.push_back(name);
-  check_count(file, static_cast<int64_t>(names.size()), count);
+  check_count(file, std::ssize(names), count);
   for (const std::string& name : names) check_data(file, header, name, image.bytes / count);
 }
 

@@ -84,7 +84,7 @@ class Parts {
 std::vector<char> flat_parts(const Surface& surface, double area) {
   Parts parts(surface);
   std::vector<char> flat(surface.triangles.size(), 0), small(flat.size(), 0);
-  for (int64_t seed = 0; seed < static_cast<int64_t>(flat.size()); seed += seed_every) {
+  for (int64_t seed = 0; seed < std::ssize(flat); seed += seed_every) {
     if (flat[seed] || small[seed]) continue;
     Plane plane = parts.at(seed);
     double grown = 0;
@@ -120,7 +120,7 @@ struct BorderLoop {
 /// Loops of border edges by one of their vertices.
 std::map<int64_t, BorderLoop> border_loops(const Surface& surface) {
   const EdgeTable edges(surface.triangles);
-  UnionFind loops(static_cast<int64_t>(surface.points.size()));
+  UnionFind loops(std::ssize(surface.points));
   for (int64_t e = 0; e < edges.edges(); ++e)
     if (edges[e].size() == 1) loops.unite(edges[e].front().low, edges[e].front().high);
   std::map<int64_t, BorderLoop> of_vertex;
@@ -140,7 +140,7 @@ Cones cones_of(const Surface& surface, double passes) {
   Cones cones;
   const auto add = [](const BorderLoop& loop, Surface& cone) {
     for (const auto& [a, b] : loop.sides) {
-      const auto first = static_cast<int64_t>(cone.points.size());
+      const auto first = std::ssize(cone.points);
       cone.points.insert(cone.points.end(), {a, b, loop.sum / loop.length});
       cone.triangles.push_back({first, first + 1, first + 2});
     }

@@ -121,7 +121,7 @@ int64_t leave_out(const Vec3& low, const Vec3& high, Volume& volume) {
     volume.values[v] = beyond_volume;
     ++count;
   }
-  if (count == static_cast<int64_t>(volume.values.size())) refuse_beside(volume, low, high);
+  if (count == std::ssize(volume.values)) refuse_beside(volume, low, high);
   return count;
 }
 

@@ -229,7 +229,7 @@ BlockPattern Coarsening::find_pattern(const ColumnLevel& fine, int32_t own, int3
     }
     std::sort(row.begin(), row.end());
     pattern.column.insert(pattern.column.end(), row.begin(), row.end());
-    pattern.begin.push_back(static_cast<int64_t>(pattern.column.size()));
+    pattern.begin.push_back(std::ssize(pattern.column));
   }
   return pattern;
 }

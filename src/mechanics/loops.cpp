@@ -16,7 +16,7 @@ template <size_t n, class Request>
 Chosen choose(const model::Model& part, const std::vector<std::array<int64_t, n>>& elements,
               int64_t owned, Request&& requested, bool soft = true) {
   Chosen chosen;
-  for (int64_t e = 0; e < static_cast<int64_t>(elements.size()); ++e)
+  for (int64_t e = 0; e < std::ssize(elements); ++e)
     if (requested(e) && model::touches_soft_tissue(part.points, elements[e]) == soft)
       (e < owned ? chosen.counted : chosen.others).push_back(e);
   const auto first = [&](int64_t e) { return *std::ranges::min_element(elements[e]); };
@@ -29,7 +29,7 @@ Chosen choose(const model::Model& part, const std::vector<std::array<int64_t, n>
 template <class Loop, size_t n, class Add>
 void append(const std::vector<std::array<int64_t, n>>& elements, const Chosen& chosen, Loop& loop,
             Add&& add) {
-  loop.counted = static_cast<int64_t>(chosen.counted.size());
+  loop.counted = std::ssize(chosen.counted);
   for (const auto* rows : {&chosen.counted, &chosen.others})
     for (const int64_t row : *rows) {
       std::copy_n(elements[row].begin(), n, loop.points.emplace_back().begin());

@@ -138,7 +138,7 @@ void add_prism(const model::Model& part, int64_t row, int64_t owned_prisms, Noda
   const model::Prisms& prisms = part.prisms;
   const double v0 = prisms.rest_volume[row], averaged = prisms.nodal_modulus[row];
   const bool soft = model::touches_soft_tissue(part.points, prisms.points[row]);
-  nodal.place[row] = static_cast<int64_t>(nodal.rest_volume.size());
+  nodal.place[row] = std::ssize(nodal.rest_volume);
   nodal.rest_volume.push_back(v0);
   nodal.own_stiffness.push_back((prisms.modulus[row] - averaged) / v0);
   nodal.own_target.push_back(own_target_volume(prisms, row));
@@ -171,10 +171,9 @@ NodalVolumes make_nodal_volumes(const model::Model& part, int64_t owned, int64_t
   if (prisms.nodal_modulus.empty()) return nodal;
   nodal.place.resize(prisms.points.size());
   for (const auto& stack : find_stacks(part)) {
-    const auto size = static_cast<int64_t>(stack.size());
+    const auto size = std::ssize(stack);
     if (nodal.stacks.empty() || nodal.stacks.back().prisms != size)
-      nodal.stacks.push_back({size, 0, static_cast<int64_t>(nodal.rest_volume.size()),
-                              static_cast<int64_t>(nodal.points.size())});
+      nodal.stacks.push_back({size, 0, std::ssize(nodal.rest_volume), std::ssize(nodal.points)});
     ++nodal.stacks.back().count;
     const auto& top = prisms.points[stack.front()];
     nodal.points.insert(nodal.points.end(), top.begin(), top.begin() + 3);

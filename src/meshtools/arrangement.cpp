@@ -64,7 +64,7 @@ class Joined {
     std::vector<int64_t> first;
     std::vector<ExactPoint> all;
     for (const Mesh& mesh : meshes) {
-      first.push_back(static_cast<int64_t>(all.size()));
+      first.push_back(std::ssize(all));
       for (const auto vertex : mesh.vertices()) all.push_back(mesh.point(vertex));
     }
     const std::vector<int64_t> number = join(all);
@@ -91,7 +91,7 @@ class Joined {
     });
     for (const int64_t i : order) {
       if (points.empty() || points.back() != all[i]) points.push_back(all[i]);
-      number[i] = static_cast<int64_t>(points.size()) - 1;
+      number[i] = std::ssize(points) - 1;
     }
     return number;
   }
@@ -144,7 +144,7 @@ class Around {
 /// The two sides of each triangle (2 t in front, 2 t + 1 behind) united to cells: around every edge
 /// a triangle's side and the facing side of the next triangle bound the same cell.
 UnionFind unite_sides(const Joined& all, const EdgeTable& edges, const std::string& name) {
-  UnionFind cells(2 * static_cast<int64_t>(all.triangles.size()));
+  UnionFind cells(2 * std::ssize(all.triangles));
   // A triangle that runs from low to high has its front towards greater angles.
   const auto ahead = [](const HalfEdge& h) { return 2 * h.triangle + (h.rising ? 0 : 1); };
   const auto behind = [](const HalfEdge& h) { return 2 * h.triangle + (h.rising ? 1 : 0); };
@@ -159,7 +159,7 @@ UnionFind unite_sides(const Joined& all, const EdgeTable& edges, const std::stri
 
 /// For each triangle whether it hangs together with the bone over edges.
 std::vector<bool> on_the_bone(const Joined& all, const EdgeTable& edges) {
-  const auto count = static_cast<int64_t>(all.triangles.size());
+  const auto count = std::ssize(all.triangles);
   UnionFind parts = connected(all.triangles, edges);
   std::vector<bool> with_bone(count, false), result(count, false);
   for (int64_t t = 0; t < count; ++t)

@@ -66,7 +66,7 @@ Surface offset_sheet(const Surface& sheet, double distance) {
 /// The strip between the borders of two sheets with the same triangles, facing away from them.
 Surface wall(const Surface& upper, const Surface& lower) {
   Surface strip{"wall of the kerf", upper.points, {}};
-  const auto shift = static_cast<int64_t>(upper.points.size());
+  const auto shift = std::ssize(upper.points);
   strip.points.insert(strip.points.end(), lower.points.begin(), lower.points.end());
   const EdgeTable edges(upper.triangles);
   for (int64_t e = 0; e < edges.edges(); ++e) {

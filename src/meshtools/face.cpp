@@ -48,7 +48,7 @@ class Cut {
 
   int64_t append(const Vec3& point) {
     part_.points.push_back(point);
-    return static_cast<int64_t>(part_.points.size()) - 1;
+    return std::ssize(part_.points) - 1;
   }
 
   int64_t vertex(int64_t v) {

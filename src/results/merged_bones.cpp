@@ -7,7 +7,7 @@ namespace repose::results {
 MergedBones merge_bones(const std::vector<surface::Surface>& surfaces) {
   MergedBones all;
   for (size_t b = 0; b < surfaces.size(); ++b) {
-    const auto first = static_cast<int64_t>(all.points.size());
+    const auto first = std::ssize(all.points);
     all.points.insert(all.points.end(), surfaces[b].points.begin(), surfaces[b].points.end());
     all.point_bone.resize(all.points.size(), static_cast<int32_t>(b));
     for (const Triangle& t : surfaces[b].triangles)

@@ -103,7 +103,7 @@ model::Contact read_contact(const Reader& in) {
   contact.stiffness = in.number(group, "stiffness");
   contact.spacing = in.number(group, "grid");
   const std::vector<std::string> names = in.names(group + "/body");
-  const auto bodies = static_cast<int64_t>(names.size());
+  const auto bodies = std::ssize(names);
   const auto bone = in.integers<int32_t>(group + "/body_bone", bodies);
   const auto kind = in.integers<int8_t>(group + "/body_kind", bodies);
   const auto push = in.vectors(group + "/body_push", bodies);
@@ -129,7 +129,7 @@ model::AdhesionRule read_adhesion(const Reader& in) {
   const std::vector<Vec3> line = in.vectors(group + "/lip_line", 3);
   std::ranges::copy(line, rule.lip_line.begin());
   const auto bone = in.integers<int32_t>(group + "/bone", Shape::any);
-  const auto jaws = static_cast<int64_t>(bone.size());
+  const auto jaws = std::ssize(bone);
   const auto upper = in.integers<int8_t>(group + "/upper", jaws);
   const auto box = in.numbers(group + "/box", {jaws, {6}});
   const auto reach = in.numbers(group + "/reach", {jaws, {}});
@@ -180,7 +180,7 @@ void read_metadata(const Reader& in, model::Model& model) {
   if (in.has("/model/skin/points")) model.skin = in.tuples<3>("/model/skin/points", Shape::any);
   if (in.has("/model/bone")) model.bones = in.names("/model/bone");
   if (in.has("/model/bone_transform"))
-    model.bone_transform = read_transforms(in, static_cast<int64_t>(model.bones.size()));
+    model.bone_transform = read_transforms(in, std::ssize(model.bones));
   if (in.has("/model/bone_surface")) model.bone_surfaces = read_bone_surfaces(in, model.bones);
   if (in.has("/model/adhesion")) model.adhesion = read_adhesion(in);
   if (in.has("/model/contact")) model.contact = read_contact(in);

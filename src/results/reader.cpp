@@ -153,7 +153,7 @@ std::vector<double> Reader::numbers(const std::string& path, const Shape& shape)
   return named(*this, path, [&] {
     int64_t rows = 0;
     std::vector<double> values = open_rows(path, shape, rows).numbers();
-    const int64_t per_row = static_cast<int64_t>(values.size()) / std::max<int64_t>(rows, 1);
+    const int64_t per_row = std::ssize(values) / std::max<int64_t>(rows, 1);
     require_finite(*this, path, values, std::max<int64_t>(per_row, 1));
     return values;
   });

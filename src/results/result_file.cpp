@@ -50,9 +50,9 @@ std::vector<NamedBone> name_bones(const model::Model& model) {
   std::vector<NamedBone> named;
   int64_t first = 0;
   for (size_t b = 0; b < model.bone_surfaces.size(); ++b) {
-    const auto points = static_cast<int64_t>(model.bone_surfaces[b].points.size());
+    const auto points = std::ssize(model.bone_surfaces[b].points);
     named.push_back({b < model.bones.size() ? model.bones[b] : fmt::format("bone {}", b), first,
-                     points, static_cast<int64_t>(model.bone_surfaces[b].triangles.size())});
+                     points, std::ssize(model.bone_surfaces[b].triangles)});
     first += points;
   }
   return named;
@@ -64,9 +64,9 @@ FileCounts counts_of(const model::Model& model, const model::ModelRows& slabs,
   return {of.points,
           of.springs,
           of.prisms,
-          static_cast<int64_t>(model.skin.size()),
-          static_cast<int64_t>(bones.points.size()),
-          static_cast<int64_t>(bones.triangles.size()),
+          std::ssize(model.skin),
+          std::ssize(bones.points),
+          std::ssize(bones.triangles),
           slabs.solid};
 }
 

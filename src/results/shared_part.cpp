@@ -79,7 +79,7 @@ void SharedPart::write_dataset(hid_t group, const char* dataset, std::array<int6
                                const base::Slab& mine, std::span<const double> values) const {
   base::Hdf5Dataset created;
   on_disk([&] {
-    if (static_cast<int64_t>(values.size()) != mine.rows() * std::max<int64_t>(shape[1], 1))
+    if (std::ssize(values) != mine.rows() * std::max<int64_t>(shape[1], 1))
       throw base::InternalError(fmt::format("{}: values are not this rank's slab", dataset));
     created = create_rows(group, dataset, shape[0], shape[1]);
   });

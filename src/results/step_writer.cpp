@@ -97,7 +97,7 @@ bool StepWriter::write_bones(hid_t step, double load) const {
   bool moved = !at_load.empty();
   base::broadcast(part_.comm(), moved);
   const base::Hdf5Group group = part_.create_group(step, "bone_surface");
-  const base::Slab mine{0, static_cast<int64_t>(bones_.points.size())};
+  const base::Slab mine{0, std::ssize(bones_.points)};
   const std::vector<Vec3> displacement = displacements(bones_, at_load);
   part_.write_dataset(group, "displacement", {counts.bone_points, 3}, mine,
                       numbers_of(displacement));

@@ -114,7 +114,7 @@ void write_vtkhdf(hid_t file, const Blocks& blocks, const std::vector<double>& l
   write_attribute(steps, "NSteps", static_cast<int64_t>(count));
   write_array(steps, "Values", loads);
   write_array(steps, "PartOffsets", beginnings(count, 0));
-  write_array(steps, "NumberOfParts", Indices(count, static_cast<int64_t>(blocks.size())));
+  write_array(steps, "NumberOfParts", Indices(count, std::ssize(blocks)));
   write_array(steps, "PointOffsets", beginnings(count, rows_of(blocks, true)));
   const Indices same = beginnings(count, 0);
   write_array(steps, "CellOffsets", {count, 1}, same.data());

@@ -184,7 +184,7 @@ void CollisionTree::build(std::vector<int64_t>& rows, size_t begin, size_t end) 
   std::nth_element(rows.begin() + begin, rows.begin() + half, rows.begin() + end,
                    [&](int64_t s, int64_t t) { return middle(s)[axis] < middle(t)[axis]; });
   build(rows, begin, half);
-  nodes_[self].right = static_cast<int64_t>(nodes_.size());
+  nodes_[self].right = std::ssize(nodes_);
   build(rows, half, end);
 }
 
@@ -240,7 +240,7 @@ std::vector<char> triangles_near(const CollisionTree& a, const CollisionTree& b,
 }
 
 void append_triangle(const Corners& t, Surface& soup) {
-  const auto first = static_cast<int64_t>(soup.points.size());
+  const auto first = std::ssize(soup.points);
   soup.points.insert(soup.points.end(), t.begin(), t.end());
   soup.triangles.push_back({first, first + 1, first + 2});
 }

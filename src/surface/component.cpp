@@ -22,7 +22,7 @@ std::vector<int64_t> parts_of(const Surface& surface, const EdgeTable& edges, in
   UnionFind sets = connected(surface.triangles, edges);
   std::vector<int64_t> part(surface.triangles.size());
   count = 0;
-  for (int64_t t = 0; t < static_cast<int64_t>(part.size()); ++t)
+  for (int64_t t = 0; t < std::ssize(part); ++t)
     part[t] = sets.find(t) == t ? count++ : part[sets.find(t)];
   return part;
 }
@@ -40,7 +40,7 @@ std::vector<Surface> split(const Surface& surface, const EdgeTable& edges) {
       const int64_t old = vertex;
       if (owner[old] != part[t]) {
         owner[old] = part[t];
-        row[old] = static_cast<int64_t>(target.points.size());
+        row[old] = std::ssize(target.points);
         target.points.push_back(surface.points[old]);
       }
       vertex = row[old];
@@ -105,7 +105,7 @@ Samples sample(const Surface& surface, double spacing) {
 }
 
 void append(const Surface& part, Surface& whole) {
-  const auto shift = static_cast<int64_t>(whole.points.size());
+  const auto shift = std::ssize(whole.points);
   whole.points.insert(whole.points.end(), part.points.begin(), part.points.end());
   for (const auto& [a, b, c] : part.triangles)
     whole.triangles.push_back({a + shift, b + shift, c + shift});
@@ -118,7 +118,7 @@ Surface compact(std::string name, const std::vector<Vec3>& points,
   for (Triangle& triangle : found.triangles)
     for (int64_t& vertex : triangle) {
       if (row[vertex] < 0) {
-        row[vertex] = static_cast<int64_t>(found.points.size());
+        row[vertex] = std::ssize(found.points);
         found.points.push_back(points[vertex]);
       }
       vertex = row[vertex];

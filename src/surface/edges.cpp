@@ -133,7 +133,7 @@ std::vector<char> border_vertices(const EdgeTable& edges, size_t points) {
 }
 
 UnionFind connected(const std::vector<Triangle>& triangles, const EdgeTable& edges) {
-  UnionFind parts(static_cast<int64_t>(triangles.size()));
+  UnionFind parts(std::ssize(triangles));
   for (int64_t e = 0; e < edges.edges(); ++e)
     for (const auto& half : edges[e]) parts.unite(edges[e].front().triangle, half.triangle);
   return parts;
@@ -188,7 +188,7 @@ void require_sound(const Surface& surface) {
     if (!surface.points[i].allFinite())
       base::refuse("{}: vertex {} has a coordinate that is not finite; repair or remove it",
                    surface.name, i);
-  const auto count = static_cast<int64_t>(surface.points.size());
+  const auto count = std::ssize(surface.points);
   for (size_t t = 0; t < surface.triangles.size(); ++t)
     for (const int64_t vertex : surface.triangles[t])
       if (vertex < 0 || vertex >= count)
@@ -197,7 +197,7 @@ void require_sound(const Surface& surface) {
 }
 
 UnionFind fans(const std::vector<Triangle>& triangles, const EdgeTable& edges) {
-  UnionFind corners(3 * static_cast<int64_t>(triangles.size()));
+  UnionFind corners(3 * std::ssize(triangles));
   for (int64_t e = 0; e < edges.edges(); ++e) {
     const auto edge = edges[e];
     if (edge.size() != 2) continue;
@@ -211,12 +211,12 @@ void split_fans(Surface& surface) {
   UnionFind corners = fans(surface.triangles, EdgeTable(surface.triangles));
   std::vector<int64_t> keeper(surface.points.size(), -1);
   std::map<int64_t, int64_t> copy;  // of a fan's point
-  for (int64_t c = 0; c < 3 * static_cast<int64_t>(surface.triangles.size()); ++c) {
+  for (int64_t c = 0; c < 3 * std::ssize(surface.triangles); ++c) {
     int64_t& vertex = surface.triangles[c / 3][c % 3];
     const int64_t fan = corners.find(c);
     if (keeper[vertex] < 0) keeper[vertex] = fan;
     if (keeper[vertex] == fan) continue;
-    const auto next = static_cast<int64_t>(surface.points.size());
+    const auto next = std::ssize(surface.points);
     const auto [place, fresh] = copy.try_emplace(fan, next);
     const Vec3 point = surface.points[vertex];
     if (fresh) surface.points.push_back(point);

@@ -56,7 +56,7 @@ struct Counts {
 /// Refuses a header that promises more than the file can hold, with at least so many bytes each.
 void check_counts(const Content& content, int64_t line, const Counts& promised,
                   const Counts& bytes_each) {
-  const auto room = static_cast<int64_t>(content.bytes.size());
+  const auto room = std::ssize(content.bytes);
   const auto [points, faces] = promised;
   if (points < 0 || faces < 0 || points > room / bytes_each.points ||
       faces > room / bytes_each.faces)
@@ -81,7 +81,7 @@ Soup parse_text(const Content& content, Lines& lines, std::vector<std::string_vi
   for (int64_t i = 0; i < faces; ++i) {
     const auto line = lines.next();
     const auto corners = lines.integer(line[0]);
-    if (corners < 0 || corners >= static_cast<int64_t>(line.size()))
+    if (corners < 0 || corners >= std::ssize(line))
       fail(content, lines.line(), fmt::format("a face of {} vertex numbers expected", corners));
     auto& polygon = soup.polygons.emplace_back();
     for (int64_t k = 1; k <= corners; ++k) polygon.push_back(lines.integer(line[k]));

@@ -84,10 +84,10 @@ TriangleTree::TriangleTree(const Surface& surface)
     centers.push_back((a + b + c) / 3);
   }
   nodes_.reserve(order_.size());
-  build(0, static_cast<int64_t>(order_.size()), -1, centers);
+  build(0, std::ssize(order_), -1, centers);
   sorted_.reserve(order_.size());
   for (const int64_t t : order_) {
-    row_[t] = static_cast<int64_t>(sorted_.size());
+    row_[t] = std::ssize(sorted_);
     sorted_.push_back(corners(surface, surface.triangles[t]));
   }
   for (auto node = nodes_.rbegin(); node != nodes_.rend(); ++node) node->box = box_around(*node);
@@ -95,7 +95,7 @@ TriangleTree::TriangleTree(const Surface& surface)
 
 int64_t TriangleTree::build(int64_t first, int64_t end, int64_t parent,
                             const std::vector<Vec3>& centers) {
-  const auto number = static_cast<int64_t>(nodes_.size());
+  const auto number = std::ssize(nodes_);
   nodes_.push_back({{}, first, end - first, -1, parent});
   if (end - first <= leaf_size) {
     for (int64_t i = first; i < end; ++i) leaf_of_[order_[i]] = number;

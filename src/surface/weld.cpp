@@ -63,7 +63,7 @@ void drop_isolated_points(Surface& surface) {
   std::vector<Vec3> kept;
   for (size_t i = 0; i < row.size(); ++i) {
     if (row[i] < 0) continue;
-    row[i] = static_cast<int64_t>(kept.size());
+    row[i] = std::ssize(kept);
     kept.push_back(surface.points[i]);
   }
   surface.points = std::move(kept);
@@ -127,7 +127,7 @@ class Orienter {
     Part part;
     std::vector<bool> turned;
     const auto add = [&](int64_t triangle, bool turn_it) {
-      part_of_[triangle] = static_cast<int64_t>(parts_.size());
+      part_of_[triangle] = std::ssize(parts_);
       part.triangles.push_back(triangle);
       turned.push_back(turn_it);
     };

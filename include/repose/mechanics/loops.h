@@ -20,7 +20,7 @@ struct SpringLoop {
   std::vector<double> rest_length;             ///< [S] mm
   std::vector<double> inverse_reference;       ///< [S] 1/s_ref, 1/mm
   int64_t counted = 0;  ///< springs [0, counted) add to energies here, the rest elsewhere
-  int64_t size() const { return static_cast<int64_t>(points.size()); }
+  int64_t size() const { return std::ssize(points); }
 };
 
 /// Edges of a solid: pairs of points with a weight of either sign. Edges with the same first point
@@ -29,7 +29,7 @@ struct EdgeLoop {
   std::vector<std::array<int32_t, 2>> points;  ///< [E] ascending in each edge
   std::vector<double> weight;                  ///< [E] N/mm
   int64_t counted = 0;                         ///< as in SpringLoop
-  int64_t size() const { return static_cast<int64_t>(points.size()); }
+  int64_t size() const { return std::ssize(points); }
 };
 
 /// Prisms with at least one soft-tissue point.
@@ -44,7 +44,7 @@ struct PrismLoop {
   std::vector<double> target_volume;  ///< [M] what the volume term draws v to; v_0 at first
   std::vector<int64_t> row;           ///< [M] the prism's row in the part
   int64_t counted = 0;                ///< as in SpringLoop
-  int64_t size() const { return static_cast<int64_t>(points.size()); }
+  int64_t size() const { return std::ssize(points); }
 };
 
 /// All that a rank evaluates.

@@ -35,7 +35,7 @@ class CollisionTree {
   };
   const std::vector<Node>& nodes() const { return nodes_; }
   const std::array<Vec3, 3>& corners(int64_t triangle) const { return corners_[triangle]; }
-  int64_t triangles() const { return static_cast<int64_t>(corners_.size()); }
+  int64_t triangles() const { return std::ssize(corners_); }
 
  private:
   void build(std::vector<int64_t>& rows, size_t begin, size_t end);

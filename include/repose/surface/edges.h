@@ -53,7 +53,7 @@ class EdgeTable {
  public:
   explicit EdgeTable(const std::vector<Triangle>& triangles);
 
-  int64_t edges() const { return static_cast<int64_t>(begin_.size()) - 1; }
+  int64_t edges() const { return std::ssize(begin_) - 1; }
   /// The half-edges of edge `i`, by triangle: one at a border, two inside a manifold.
   std::span<const HalfEdge> operator[](int64_t i) const {
     return std::span(half_edges_).subspan(begin_[i], begin_[i + 1] - begin_[i]);

@@ -37,7 +37,7 @@ void Comparison::array(const std::string& name, std::span<const double> stored,
                        std::span<const double> recomputed, double scale) {
   Row row;
   row.name = name;
-  row.entries = static_cast<int64_t>(stored.size());
+  row.entries = std::ssize(stored);
   if (stored.size() != recomputed.size()) {
     row.difference = infinite;
     row.wrong = row.entries = std::max<int64_t>(row.entries, 1);

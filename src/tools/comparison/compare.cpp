@@ -54,7 +54,7 @@ DistanceStatistics statistics(const std::vector<Sample>& samples) {
     result.rms += sample.area * distance * distance;
     result.maximum = std::max(result.maximum, distance);
   }
-  result.samples = static_cast<int64_t>(samples.size());
+  result.samples = std::ssize(samples);
   if (!(result.area > 0)) return {};
   result.mean_signed /= result.area;
   result.mean /= result.area;

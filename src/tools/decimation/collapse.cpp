@@ -67,7 +67,7 @@ Collapser::Collapser(const Surface& surface, const std::vector<char>& locked)
     : surface_(surface),
       tree_(surface),
       dead_(surface.triangles.size(), false),
-      alive_(static_cast<int64_t>(surface.triangles.size())),
+      alive_(std::ssize(surface.triangles)),
       origin_(surface.points[0]) {
   for (const char at : locked) vertices_.push_back({.locked = at != 0});
   for (size_t t = 0; t < surface.triangles.size(); ++t) {

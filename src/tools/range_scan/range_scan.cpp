@@ -93,14 +93,14 @@ void cut_steps(ScanMesh& mesh, const ScanOptions& options) {
 
 void keep_largest(ScanMesh& mesh) {
   std::vector<Triangle>& triangles = mesh.surface.triangles;
-  const auto all = static_cast<int64_t>(triangles.size());
+  const auto all = std::ssize(triangles);
   UnionFind parts = connected(triangles, EdgeTable(triangles));
   std::vector<int64_t> size(all, 0);
   for (int64_t t = 0; t < all; ++t) ++size[parts.find(t)];
   const int64_t largest = std::max_element(size.begin(), size.end()) - size.begin();
   int64_t t = 0;
   std::erase_if(triangles, [&](const Triangle&) { return parts.find(t++) != largest; });
-  mesh.dropped = all - static_cast<int64_t>(triangles.size());
+  mesh.dropped = all - std::ssize(triangles);
 }
 
 /// Gives each fan of triangles at a point a point of its own, and drops points without triangles.
@@ -109,9 +109,9 @@ void renumber(ScanMesh& mesh, const PointData& data) {
   UnionFind corners = fans(triangles, EdgeTable(triangles));
   std::map<int64_t, int64_t> row;  // of the fan's first corner
   std::vector<int64_t> source;
-  for (int64_t c = 0; c < 3 * static_cast<int64_t>(triangles.size()); ++c) {
+  for (int64_t c = 0; c < 3 * std::ssize(triangles); ++c) {
     int64_t& vertex = triangles[c / 3][c % 3];
-    const auto [place, fresh] = row.try_emplace(corners.find(c), static_cast<int64_t>(row.size()));
+    const auto [place, fresh] = row.try_emplace(corners.find(c), std::ssize(row));
     if (fresh) source.push_back(vertex);
     vertex = place->second;
   }
@@ -154,7 +154,7 @@ ScanMesh mesh_of(const RangeGrid& grid, const ScanOptions& options) {
 
 std::vector<double> hole_lengths(const Surface& surface) {
   const EdgeTable edges(surface.triangles);
-  const auto points = static_cast<int64_t>(surface.points.size());
+  const auto points = std::ssize(surface.points);
   UnionFind loops(points), parts(points);
   for (int64_t e = 0; e < edges.edges(); ++e) {
     const HalfEdge& half = edges[e].front();

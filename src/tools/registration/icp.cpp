@@ -63,7 +63,7 @@ class Icp {
       border_vertex_[half.low] = border_vertex_[half.high] = true;
     }
     const std::vector<Vec3> normals = vertex_normals(moving);
-    const auto count = static_cast<int64_t>(moving.points.size());
+    const auto count = std::ssize(moving.points);
     const int64_t used = std::min(count, options.samples);
     for (int64_t i = 0; i < used; ++i) {
       const int64_t vertex = i * count / used;
@@ -186,7 +186,7 @@ class Icp {
     const Error error = error_of(pairs);
     result.rms_plane = error.plane;
     result.rms = error.point;
-    result.pairs = static_cast<int64_t>(pairs.size());
+    result.pairs = std::ssize(pairs);
     std::vector<double> distances;
     for (const Vec3& point : points_)
       distances.push_back(tree_.nearest(result.transform.apply(point)).squared);
