@@ -18,14 +18,9 @@ constexpr double nothing = std::numeric_limits<double>::infinity();
 std::vector<std::array<Vec3, 3>> closings_of_holes(const std::vector<Vec3>& points,
                                                    const std::vector<Triangle>& triangles) {
   constexpr double widest = 12;  // mm, diagonal of the box around a rim
-  const surface::EdgeTable edges(triangles);
+  const std::vector<surface::HalfEdge> rim_edges = surface::EdgeTable(triangles).border();
   surface::UnionFind rims(std::ssize(points));
-  std::vector<surface::HalfEdge> rim_edges;
-  for (int64_t e = 0; e < edges.edges(); ++e) {
-    if (edges[e].size() != 1) continue;
-    rim_edges.push_back(edges[e][0]);
-    rims.unite(edges[e][0].low, edges[e][0].high);
-  }
+  for (const auto& edge : rim_edges) rims.unite(edge.low, edge.high);
   std::map<int64_t, Eigen::AlignedBox3d> boxes;
   for (const auto& edge : rim_edges)
     for (const int64_t end : {edge.low, edge.high}) boxes[rims.find(end)].extend(points[end]);

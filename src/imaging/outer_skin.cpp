@@ -119,16 +119,13 @@ struct BorderLoop {
 
 /// Loops of border edges by one of their vertices.
 std::map<int64_t, BorderLoop> border_loops(const Surface& surface) {
-  const EdgeTable edges(surface.triangles);
+  const std::vector<HalfEdge> border = EdgeTable(surface.triangles).border();
   UnionFind loops(std::ssize(surface.points));
-  for (int64_t e = 0; e < edges.edges(); ++e)
-    if (edges[e].size() == 1) loops.unite(edges[e].front().low, edges[e].front().high);
+  for (const HalfEdge& half : border) loops.unite(half.low, half.high);
   std::map<int64_t, BorderLoop> of_vertex;
-  for (int64_t e = 0; e < edges.edges(); ++e) {
-    if (edges[e].size() != 1) continue;
-    const Vec3 &a = surface.points[edges[e].front().low],
-               &b = surface.points[edges[e].front().high];
-    BorderLoop& loop = of_vertex[loops.find(edges[e].front().low)];
+  for (const HalfEdge& half : border) {
+    const Vec3 &a = surface.points[half.low], &b = surface.points[half.high];
+    BorderLoop& loop = of_vertex[loops.find(half.low)];
     loop.length += (b - a).norm();
     loop.sum += (b - a).norm() * (a + b) / 2;
     loop.sides.push_back({a, b});

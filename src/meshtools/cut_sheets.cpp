@@ -68,10 +68,7 @@ Surface wall(const Surface& upper, const Surface& lower) {
   Surface strip{"wall of the kerf", upper.points, {}};
   const auto shift = std::ssize(upper.points);
   strip.points.insert(strip.points.end(), lower.points.begin(), lower.points.end());
-  const EdgeTable edges(upper.triangles);
-  for (int64_t e = 0; e < edges.edges(); ++e) {
-    if (edges[e].size() != 1) continue;
-    const HalfEdge& h = edges[e].front();
+  for (const HalfEdge& h : EdgeTable(upper.triangles).border()) {
     const int64_t from = h.rising ? h.low : h.high, to = h.rising ? h.high : h.low;
     strip.triangles.push_back({to, from, from + shift});
     strip.triangles.push_back({to, from + shift, to + shift});

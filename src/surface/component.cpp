@@ -11,12 +11,6 @@
 namespace repose::surface {
 namespace {
 
-bool is_open(const EdgeTable& edges) {
-  for (int64_t e = 0; e < edges.edges(); ++e)
-    if (edges[e].size() == 1) return true;
-  return false;
-}
-
 /// Returns the part of each triangle; parts are numbered in the order of their first triangle.
 std::vector<int64_t> parts_of(const Surface& surface, const EdgeTable& edges, int64_t& count) {
   UnionFind sets = connected(surface.triangles, edges);
@@ -129,7 +123,7 @@ Surface compact(std::string name, const std::vector<Vec3>& points,
 std::vector<Surface> components(const Surface& surface) {
   const EdgeTable edges(surface.triangles);
   std::vector<Surface> parts = split(surface, edges);
-  const bool by_area = is_open(edges);
+  const bool by_area = !edges.border().empty();
   std::vector<std::pair<double, size_t>> order;
   for (size_t p = 0; p < parts.size(); ++p)
     order.emplace_back(by_area ? -area_of(parts[p]) : -std::abs(volume_of(parts[p])), p);

@@ -50,19 +50,16 @@ void count_fans(const Surface& surface, UnionFind& corners, Defects& d) {
 /// of its own.
 int64_t count_border_loops(const EdgeTable& edges, UnionFind& corners, size_t triangles) {
   std::vector<int64_t> edge_at_fan(3 * triangles, -1);
-  UnionFind loops(edges.edges());
-  std::vector<int64_t> border;
-  for (int64_t e = 0; e < edges.edges(); ++e) {
-    if (edges[e].size() != 1) continue;
-    border.push_back(e);
-    const HalfEdge& half = edges[e].front();
-    for (const int64_t corner : {half.corner_at_low(), half.corner_at_high()}) {
+  const std::vector<HalfEdge> border = edges.border();
+  const std::vector<int64_t> rows = base::all_rows(border.size());
+  UnionFind loops(std::ssize(border));
+  for (const int64_t e : rows)
+    for (const int64_t corner : {border[e].corner_at_low(), border[e].corner_at_high()}) {
       int64_t& other = edge_at_fan[corners.find(corner)];
       if (other >= 0) loops.unite(e, other);
       other = e;
     }
-  }
-  return std::count_if(border.begin(), border.end(), [&](int64_t e) { return loops.find(e) == e; });
+  return std::ranges::count_if(rows, [&](int64_t e) { return loops.find(e) == e; });
 }
 
 /// Vertices that coincide count as one here, or every seam would be a crossing.

@@ -110,6 +110,13 @@ bool EdgeTable::contains(int64_t a, int64_t b) const {
   return found != half_edges_.end() && std::pair(found->low, found->high) == requested;
 }
 
+std::vector<HalfEdge> EdgeTable::border() const {
+  std::vector<HalfEdge> border;
+  for (int64_t e = 0; e < edges(); ++e)
+    if ((*this)[e].size() == 1) border.push_back((*this)[e].front());
+  return border;
+}
+
 VertexNeighbors::VertexNeighbors(const EdgeTable& edges, size_t vertices)
     : begin_(vertices + 1, 0), vertex_(2 * edges.edges()) {
   for (int64_t e = 0; e < edges.edges(); ++e) {
@@ -127,8 +134,7 @@ VertexNeighbors::VertexNeighbors(const EdgeTable& edges, size_t vertices)
 
 std::vector<char> border_vertices(const EdgeTable& edges, size_t points) {
   std::vector<char> border(points, 0);
-  for (int64_t e = 0; e < edges.edges(); ++e)
-    if (edges[e].size() == 1) border[edges[e].front().low] = border[edges[e].front().high] = 1;
+  for (const HalfEdge& half : edges.border()) border[half.low] = border[half.high] = 1;
   return border;
 }
 

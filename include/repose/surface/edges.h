@@ -59,6 +59,8 @@ class EdgeTable {
     return std::span(half_edges_).subspan(begin_[i], begin_[i + 1] - begin_[i]);
   }
   bool contains(int64_t a, int64_t b) const;
+  /// The half-edges at the border, in the order of the edges.
+  std::vector<HalfEdge> border() const;
 
  private:
   std::vector<HalfEdge> half_edges_;

@@ -154,20 +154,16 @@ ScanMesh mesh_of(const RangeGrid& grid, const ScanOptions& options) {
 
 std::vector<double> hole_lengths(const Surface& surface) {
   const EdgeTable edges(surface.triangles);
+  const std::vector<HalfEdge> border = edges.border();
   const auto points = std::ssize(surface.points);
   UnionFind loops(points), parts(points);
-  for (int64_t e = 0; e < edges.edges(); ++e) {
-    const HalfEdge& half = edges[e].front();
-    parts.unite(half.low, half.high);
-    if (edges[e].size() == 1) loops.unite(half.low, half.high);
-  }
+  for (int64_t e = 0; e < edges.edges(); ++e)
+    parts.unite(edges[e].front().low, edges[e].front().high);
+  for (const HalfEdge& half : border) loops.unite(half.low, half.high);
   std::map<int64_t, std::map<int64_t, double>> lengths;  // [part][loop]
-  for (int64_t e = 0; e < edges.edges(); ++e) {
-    const HalfEdge& half = edges[e].front();
-    if (edges[e].size() == 1)
-      lengths[parts.find(half.low)][loops.find(half.low)] +=
-          (surface.points[half.high] - surface.points[half.low]).norm();
-  }
+  for (const HalfEdge& half : border)
+    lengths[parts.find(half.low)][loops.find(half.low)] +=
+        (surface.points[half.high] - surface.points[half.low]).norm();
   std::vector<double> holes;
   for (const auto& [part, borders] : lengths) {
     std::vector<double> sorted;

@@ -55,10 +55,7 @@ class Icp {
         tree_(fixed),
         border_edge_(fixed.triangles.size()),
         border_vertex_(fixed.points.size()) {
-    const EdgeTable edges(fixed.triangles);
-    for (int64_t e = 0; e < edges.edges(); ++e) {
-      if (edges[e].size() != 1) continue;
-      const HalfEdge& half = edges[e].front();
+    for (const HalfEdge& half : EdgeTable(fixed.triangles).border()) {
       border_edge_[half.triangle][half.corner] = true;
       border_vertex_[half.low] = border_vertex_[half.high] = true;
     }
