@@ -2,6 +2,7 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <functional>
 
 #include "repose/base/collective.h"
 
@@ -61,21 +62,13 @@ std::vector<int32_t> aggregate(const ColumnLevel& fine) {
 std::vector<Place> number_points(const ColumnLevel& fine, const std::vector<int32_t>& group,
                                  std::vector<int32_t>& point) {
   const std::vector<int32_t> column = columns_of_points(fine);
-  std::vector<Place> place;
+  std::vector<Place> of_fine;
   for (int32_t i = 0; i < fine.own(); ++i)
-    place.push_back({group[column[i]], fine.place()[i].layer});
-  const auto order = [](const Place& a, const Place& b) {
-    return std::pair(a.column, a.layer) < std::pair(b.column, b.layer);
-  };
-  const std::vector<Place> of_fine = place;
-  std::sort(place.begin(), place.end(), order);
-  const auto same = [](const Place& a, const Place& b) {
-    return a.column == b.column && a.layer == b.layer;
-  };
-  place.erase(std::unique(place.begin(), place.end(), same), place.end());
+    of_fine.push_back({group[column[i]], fine.place()[i].layer});
+  std::vector<Place> place = of_fine;
+  base::sort_unique(place);
   for (const Place& p : of_fine)
-    point.push_back(static_cast<int32_t>(std::lower_bound(place.begin(), place.end(), p, order) -
-                                         place.begin()));
+    point.push_back(static_cast<int32_t>(std::ranges::lower_bound(place, p) - place.begin()));
   return place;
 }
 
@@ -147,8 +140,7 @@ void Coarsening::find_candidates(const ColumnLevel& fine, const std::vector<int3
   }
   for (Candidate& c : found) c.weight *= total > 0 ? damping / total : 0.0;
   found.front().weight += total > 0 ? 1 - damping : 1.0;
-  std::sort(found.begin(), found.end(),
-            [](const Candidate& a, const Candidate& b) { return a.weight > b.weight; });
+  std::ranges::sort(found, std::greater(), &Candidate::weight);
   if (found.size() > maximum) found.resize(maximum);
   double sum = 0;
   for (const Candidate& c : found) sum += c.weight;

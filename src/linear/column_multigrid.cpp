@@ -224,11 +224,10 @@ void ColumnMultigrid::factor() {
 }
 
 void ColumnMultigrid::set_extra(const BlockSource& blocks) {
-  using Change = Extra;
-  const auto add = [](Change& to, int32_t i, int32_t j, const Eigen::Matrix3f& block) {
+  const auto add = [](Extra& to, int32_t i, int32_t j, const Eigen::Matrix3f& block) {
     to.try_emplace({i, j}, Eigen::Matrix3f::Zero()).first->second += block;
   };
-  Change change;
+  Extra change;
   for (const auto& [at, block] : extra_) change[at] = -block;
   extra_.clear();
   blocks([&](int32_t p, int32_t q, const Mat3& block) {
@@ -240,7 +239,7 @@ void ColumnMultigrid::set_extra(const BlockSource& blocks) {
   for (const auto& [at, block] : extra_) add(change, at[0], at[1], block);
   for (size_t l = 0; l < levels_.size(); ++l) {
     std::vector<int32_t> touched;
-    Change next;
+    Extra next;
     for (const auto& [at, block] : change) {
       if (block.isZero(0)) continue;
       levels_[l].matrix->add(at[0], at[1], block);

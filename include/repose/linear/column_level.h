@@ -1,4 +1,6 @@
 #pragma once
+#include <compare>
+
 #include "repose/base/geometry.h"
 #include "repose/linear/sweep_order.h"
 
@@ -12,6 +14,7 @@ using Lanes = float __attribute__((vector_size(16)));
 struct Place {
   int32_t column;  ///< any number: successive points with the same one are a column's
   int32_t layer;
+  auto operator<=>(const Place&) const = default;
 };
 
 /// A symmetric positive semidefinite matrix of 3×3 blocks, this rank's rows of it, and
