@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "repose/surface/intersections.h"
+#include "repose/surface/read.h"
 
 namespace repose::surface {
 namespace {
@@ -63,12 +64,8 @@ int64_t count_border_loops(const EdgeTable& edges, UnionFind& corners, size_t tr
 }
 
 /// Vertices that coincide count as one here, or every seam would be a crossing.
-void count_self_intersections(const Surface& surface, const std::vector<int64_t>& first,
-                              Defects& d) {
-  Surface welded = surface;
-  for (auto& triangle : welded.triangles)
-    for (auto& vertex : triangle) vertex = first[vertex];
-  d.self_intersections = static_cast<int64_t>(self_intersections(welded).size());
+int64_t count_self_intersections(const Surface& surface) {
+  return std::ssize(self_intersections(welded(surface)));
 }
 
 }  // namespace
@@ -86,7 +83,7 @@ Defects inspect(const Surface& surface, bool self_intersections) {
   UnionFind corners = fans(surface.triangles, edges);
   count_fans(surface, corners, d);
   d.border_loops = count_border_loops(edges, corners, surface.triangles.size());
-  if (self_intersections) count_self_intersections(surface, first, d);
+  if (self_intersections) d.self_intersections = count_self_intersections(surface);
   const bool closed = d.border_edges == 0 && d.non_manifold_edges == 0;
   d.outward =
       closed && d.misoriented_edges == 0 && six_volumes(surface.points, surface.triangles) > 0;
