@@ -172,11 +172,6 @@ void smooth(const VertexNeighbors& neighbors, int rounds, std::vector<double>& v
   }
 }
 
-bool in_any(const std::vector<std::function<bool(const Vec3&)>>& regions, const Vec3& point) {
-  return std::any_of(regions.begin(), regions.end(),
-                     [&](const auto& contains) { return contains(point); });
-}
-
 /// Makes negative what spans an opening of the given skin: there the opening is nearer than the
 /// given triangles. The border of the opening lies where both are equally far.
 void leave_open(const OuterSkin& outer, const Surface& given, std::vector<double>& inside) {
@@ -197,8 +192,10 @@ Surface region_of(const OuterSkin& outer, const Surface& given, const FaceReques
   const std::vector<char> end = ends_of(outer);
   std::vector<double> inside(end.size(), request.margin);
   if (!request.regions.empty()) {
-    for (size_t v = 0; v < end.size(); ++v)
-      if (!in_any(request.regions, outer.skin.points[v])) inside[v] = -request.margin;
+    for (size_t v = 0; v < end.size(); ++v) {
+      const auto holds = [&](const auto& contains) { return contains(outer.skin.points[v]); };
+      if (std::ranges::none_of(request.regions, holds)) inside[v] = -request.margin;
+    }
   } else if (!request.beneath.empty() || !request.places.empty()) {
     inside = path_length_from_bones(outer.skin, neighbors, end, request);
     for (double& value : inside) value = request.margin - std::min(value, 2 * request.margin);
@@ -257,12 +254,6 @@ void fit(const Samples& samples, const VertexNeighbors& neighbors, std::vector<i
   for (size_t v = 0; v < offset.size(); ++v) face.points[v] += offset[v] * normals[v];
 }
 
-Vec3 middle_of(std::span<const int64_t> vertices, const std::vector<Vec3>& points) {
-  Vec3 sum = Vec3::Zero();
-  for (const int64_t v : vertices) sum += points[v];
-  return sum / static_cast<double>(vertices.size());
-}
-
 /// Cosine of the least angle of a triangle.
 double greatest_cosine(const Corners& p) {
   double greatest = -1;
@@ -292,7 +283,8 @@ void widen_angles(const VertexNeighbors& neighbors, Surface& face) {
       const double before = cosine_at(v);
       if (before <= thin) continue;
       const Vec3 old = face.points[v];
-      const Vec3 step = middle_of(neighbors[static_cast<int64_t>(v)], face.points) - old;
+      const Vec3 step =
+          base::mean(base::pick(face.points, neighbors[static_cast<int64_t>(v)])) - old;
       for (double share = 1; share > 0.1; share /= 2) {
         face.points[v] = old + share * step;
         if (cosine_at(v) < before) break;
@@ -316,7 +308,8 @@ void unfold(const VertexNeighbors& neighbors, Surface& face) {
     }
     if (std::count(moved.begin(), moved.end(), 1) == 0) return;
     for (size_t v = 0; v < moved.size(); ++v)
-      if (moved[v]) face.points[v] = middle_of(neighbors[static_cast<int64_t>(v)], old);
+      if (moved[v])
+        face.points[v] = base::mean(base::pick(old, neighbors[static_cast<int64_t>(v)]));
   }
 }
 
