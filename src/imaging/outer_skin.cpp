@@ -182,18 +182,12 @@ Volume thinned(const Volume& volume, int64_t stride) {
   return thin;
 }
 
-double voxel_for(const Surface& surface, const Rolling& rolling, double margin) {
-  const Vec3 size = bounding_box(surface.points).sizes() + Vec3::Constant(2 * margin);
-  return std::max(rolling.voxel, std::cbrt(size.prod() / max_voxels));
-}
-
-/// The parts of the border of the outside, `radius` away from the skin, that lie over the scan's
-/// ends.
-Surface caps_of(const Surface& border, const Surface& ends, double radius) {
+/// The parts of the border of the outside that lie over the scan's ends.
+Surface caps_of(const Surface& border, const Surface& ends) {
   std::vector<char> cap = flat_parts(border, cap_area);
   if (!ends.triangles.empty()) {
     const TriangleTree tree(ends);
-    const double near = on_cone * on_cone * radius * radius;
+    const double near = on_cone * on_cone * outside_ball * outside_ball;
     for (size_t t = 0; t < border.triangles.size(); ++t) {
       const Corners at = corners(border, border.triangles[t]);
       if (tree.any_within((at[0] + at[1] + at[2]) / 3, near) >= 0) cap[t] = 1;
@@ -207,34 +201,35 @@ Surface caps_of(const Surface& border, const Surface& ends, double radius) {
 
 }  // namespace
 
-OuterSkin outer_skin(const Surface& given, const Rolling& rolling) {
+OuterSkin outer_skin(const Surface& given, double sampling) {
   Surface solid = welded(given);
   if (solid.triangles.empty()) base::refuse("{}: holds no triangle", given.name);
-  const Cones cones = cones_of(solid, 6 * rolling.outside);
+  const Cones cones = cones_of(solid, 6 * outside_ball);
   append(cones.all, solid);
-  const double margin = rolling.outside + 3 * rolling.voxel;
-  const double voxel = voxel_for(solid, rolling, margin);
+  constexpr double finest = 1.5, margin = outside_ball + 3 * finest;  // mm
+  const Vec3 size = bounding_box(solid.points).sizes() + Vec3::Constant(2 * margin);
+  const double voxel = std::max(finest, std::cbrt(size.prod() / max_voxels));
   constexpr double edges = 1.5;  // of a grid, beyond a level, on which distances are looked up
-  Volume field = distance_volume(solid, voxel, margin, rolling.outside + edges * voxel);
-  keep_outside(rolling.outside, field);
-  const Surface outside = largest_component(isosurface(field, -rolling.outside));
-  for (float& value : field.values) value = value >= -rolling.outside ? 1 : 0;
-  const double core = rolling.outside + rolling.inside;
+  Volume field = distance_volume(solid, voxel, margin, outside_ball + edges * voxel);
+  keep_outside(outside_ball, field);
+  const Surface outside = largest_component(isosurface(field, -outside_ball));
+  for (float& value : field.values) value = value >= -outside_ball ? 1 : 0;
+  constexpr double core = outside_ball + inside_ball;
   field = distance_volume(outside, std::move(field), core + edges * voxel);
   if (*std::max_element(field.values.begin(), field.values.end()) <= core)
     base::refuse(
         "{}: nothing of it is {:g} mm thick; for a skin that is no solid (a sheet, or a head open "
         "at several ends) leave tissue.edge out",
-        given.name, 2 * rolling.inside);
+        given.name, 2 * inside_ball);
   const Surface inner = largest_component(isosurface(field, core));
   for (float& value : field.values) value = value < core ? 1 : 0;
-  const int64_t stride = std::max(int64_t{1}, static_cast<int64_t>(rolling.sampling / voxel));
+  const int64_t stride = std::max(int64_t{1}, static_cast<int64_t>(sampling / voxel));
   field = distance_volume(inner, std::move(field),
-                          rolling.inside + edges * static_cast<double>(stride) * voxel);
+                          inside_ball + edges * static_cast<double>(stride) * voxel);
   for (float& value : field.values) value = -value;
   if (stride > 1) field = thinned(field, stride);
-  return {largest_component(isosurface(field, -rolling.inside)),
-          caps_of(outside, cones.ends, rolling.outside), rolling.outside, welded(cones.openings)};
+  return {largest_component(isosurface(field, -inside_ball)), caps_of(outside, cones.ends),
+          welded(cones.openings)};
 }
 
 }  // namespace repose::imaging

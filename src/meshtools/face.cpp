@@ -129,7 +129,7 @@ std::vector<char> ends_of(const OuterSkin& outer) {
   std::vector<char> end(outer.skin.points.size(), 0);
   if (outer.caps.triangles.empty()) return end;
   const TriangleTree tree(outer.caps);
-  const double reach = outer.cap_height + beside_cap;
+  const double reach = outside_ball + beside_cap;
   for (size_t v = 0; v < end.size(); ++v)
     end[v] = tree.any_within(outer.skin.points[v], reach * reach) >= 0;
   return end;
@@ -343,9 +343,8 @@ void count_openings(const OuterSkin& outer, Face& face) {
 
 Face solvable_face(const Surface& given, const FaceRequest& request) {
   Face face;
-  Rolling rolling;
-  rolling.sampling = std::min(coarsest_sampling, sampling_per_edge * request.edge);
-  const OuterSkin outer = outer_skin(given, rolling);
+  const OuterSkin outer =
+      outer_skin(given, std::min(coarsest_sampling, sampling_per_edge * request.edge));
   face.skin = remesh(region_of(outer, given, request), request.edge);
   count_openings(outer, face);
   const VertexNeighbors neighbors = neighbors_of(face.skin);

@@ -5,20 +5,15 @@ namespace repose::imaging {
 
 using surface::Surface;
 
-/// Options of the skin that a ball rolled over the outside of a surface, and another over its
-/// inside, touch.
-struct Rolling {
-  double voxel = 1.5;    ///< mm of the grid on which it is done
-  double outside = 3.0;  ///< mm, radius: closes holes, slits and nostrils up to twice as wide
-  double inside = 8.0;   ///< mm, radius: takes off what is thinner than twice this, such as ears
-  double sampling = 0;   ///< mm between the samples that the skin is made of, if above a voxel
-};
+/// Radii, mm, of the ball that is rolled over the outside of a surface, which closes holes, slits
+/// and nostrils up to twice as wide, and of the one over its inside, which takes off what is
+/// thinner than twice this, such as ears.
+constexpr double outside_ball = 3, inside_ball = 8;
 
 /// The outer skin of any triangles: open, flipped, doubled or with inner walls.
 struct OuterSkin {
-  Surface skin;  ///< closed, manifold, one component; smooth to about a voxel
-  Surface caps;  ///< flat ends of the scan (as parts of the skin, cap_height mm outside of them)
-  double cap_height;
+  Surface skin;      ///< closed, manifold, one component; smooth to about a voxel
+  Surface caps;      ///< flat ends of the scan: parts of the skin, outside_ball mm outside of them
   Surface openings;  ///< cones over border loops as long as that of an open mouth
 };
 
@@ -27,8 +22,9 @@ struct OuterSkin {
 /// its centers; the solid is then opened by the inside ball (erosion, then dilation). Each border
 /// is an isosurface of an unrounded distance, so balls rest on triangles and not on voxels. A
 /// border loop so long that the head is open there is closed by a cone first, which counts as a
-/// cap, as do flat parts larger than `cap_area`. Throws InputError where nothing as thick as the
-/// inside ball is left.
-OuterSkin outer_skin(const Surface& given, const Rolling& rolling);
+/// cap, as do large flat parts. `sampling`: mm between the samples that the skin is made of, if
+/// above a voxel of the grid, 1.5 mm. Throws InputError where nothing as thick as the inside ball
+/// is left.
+OuterSkin outer_skin(const Surface& given, double sampling);
 
 }  // namespace repose::imaging

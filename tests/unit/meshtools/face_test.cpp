@@ -87,7 +87,7 @@ TEST(OuterSkin, knows_where_the_scan_ends) {
   const OuterSkin flat = outer_skin(solid(cut), {});
   ASSERT_FALSE(flat.caps.triangles.empty());
   for (const Triangle& t : flat.caps.triangles)
-    EXPECT_NEAR(flat.caps.points[t[0]].z(), -10 - flat.cap_height, 1);
+    EXPECT_NEAR(flat.caps.points[t[0]].z(), -10 - outside_ball, 1);
   Surface open = solid(ball);  // its rim is closed by a cone
   std::erase_if(open.triangles, [&](const Triangle& t) { return open.points[t[0]].z() < -10; });
   const OuterSkin closed = outer_skin(open, {});
