@@ -14,8 +14,6 @@ using namespace surface;
 namespace {
 
 constexpr size_t max_pieces = 50'000'000;
-/// Triangles this many times the distance across are worth a cut along their edges.
-constexpr double large = 4;
 
 class Search {
  public:
@@ -47,10 +45,7 @@ class Search {
     pieces_.pop();
     const auto nearest = tree_.nearest(piece.center());
     parts_.clear();
-    const Corners& under = tree_.corners_of(nearest.triangle);
-    if (!longer(under, large * (lower_ + accuracy_)) || !piece.cut_to(under, 0, parts_))
-      parts_.push_back(piece.halve());
-    parts_.push_back(piece);
+    piece.split(tree_.corners_of(nearest.triangle), lower_ + accuracy_, 0, parts_);
     for (const Piece& part : parts_) {
       for (const Vec3& corner : part.corners()) see(corner);
       offer(part);

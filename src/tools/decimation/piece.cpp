@@ -9,13 +9,15 @@ namespace {
 
 /// Least share of a piece's size that a cut takes off on either side: less is rounding.
 constexpr double min_cut = 1e-3;
-
-}  // namespace
+/// Triangles this many times the distance across are worth a cut along their edges.
+constexpr double large = 4;
 
 bool longer(const Corners& triangle, double length) {
   const int k = longest_edge(triangle);
   return (triangle[(k + 1) % 3] - triangle[k]).squaredNorm() > length * length;
 }
+
+}  // namespace
 
 Piece::Piece(const Corners& triangle) : count_(3) {
   std::copy(triangle.begin(), triangle.end(), at_.begin());
@@ -65,6 +67,13 @@ Piece Piece::halve() {
     for (int j = 0; j < i; ++j)
       if ((at_[i] - at_[j]).squaredNorm() > longest.squaredNorm()) longest = at_[i] - at_[j];
   return cut(longest, longest.dot(middle));
+}
+
+void Piece::split(const Corners& triangle, double distance, double margin,
+                  std::vector<Piece>& parts) {
+  if (!longer(triangle, large * distance) || !cut_to(triangle, margin, parts))
+    parts.push_back(halve());
+  parts.push_back(*this);
 }
 
 bool Piece::cut_to(const Corners& triangle, double margin, std::vector<Piece>& rest) {

@@ -8,8 +8,6 @@ namespace repose::tools::decimation {
 
 using surface::Corners;
 
-bool longer(const Corners& triangle, double length);
-
 /// A convex flat piece of a triangle, as proofs about distances cut them.
 class Piece {
  public:
@@ -21,6 +19,12 @@ class Piece {
   bool empty() const { return count_ == 0; }
   Vec3 center() const;
 
+  /// Appends the parts that the piece is cut into by the edges of `triangle`, where that is several
+  /// times `distance` across and cuts it, otherwise its halves.
+  void split(const Corners& triangle, double distance, double margin, std::vector<Piece>& parts);
+
+ private:
+  Piece() = default;
   /// The part with normal · p ≤ offset stays; the rest is returned (perhaps empty).
   Piece cut(const Vec3& normal, double offset);
   /// Halves a triangle from the middle of its longest edge, another piece across its longest
@@ -30,9 +34,6 @@ class Piece {
   /// upright on it, cuts to what lies between them, each moved outward by `margin`; the rest goes
   /// to `rest`. Whether anything was cut off.
   bool cut_to(const Corners& triangle, double margin, std::vector<Piece>& rest);
-
- private:
-  Piece() = default;
   void add(const Vec3& point) { at_[count_++] = point; }
 
   std::array<Vec3, maximum> at_;

@@ -12,8 +12,6 @@ constexpr size_t max_open_pieces = 5000;
 /// Share of the distance that a point as high over a triangle as a piece's center may lie beside
 /// it.
 constexpr double margin_share = 0.5;
-/// Triangles this many times the distance across are worth a cut along their edges.
-constexpr double halved_above = 4;
 
 }  // namespace
 
@@ -43,10 +41,7 @@ bool Tolerance::contains(const Corners& triangle, Vec3* outside) const {
     if (nearest.triangle < 0 || pieces_.size() > max_open_pieces) return fail(center);
     hint_ = nearest.triangle;
     const double margin = margin_share * std::sqrt(squared_ - nearest.squared);
-    const Corners& under = tree_.corners_of(nearest.triangle);
-    if (!longer(under, halved_above * distance_) || !piece.cut_to(under, margin, pieces_))
-      pieces_.push_back(piece.halve());
-    pieces_.push_back(piece);
+    piece.split(tree_.corners_of(nearest.triangle), distance_, margin, pieces_);
   }
   return true;
 }
