@@ -125,7 +125,7 @@ struct Fit {
 };
 
 std::vector<Fit> best_of(std::vector<Fit> fits, size_t number) {
-  std::sort(fits.begin(), fits.end(), [](const Fit& a, const Fit& b) { return a.off < b.off; });
+  std::ranges::sort(fits, {}, &Fit::off);
   fits.resize(std::min(number, fits.size()));
   return fits;
 }

@@ -48,9 +48,8 @@ double search_mouth(const FrontMap& skin, Search& search) {
                      : "the upper incisors were not found");
     return 0;
   }
-  const auto middle = std::min_element(
-      crease.points.begin(), crease.points.end(),
-      [](const Vec3& a, const Vec3& b) { return std::abs(a.x()) < std::abs(b.x()); });
+  const auto middle =
+      std::ranges::min_element(crease.points, {}, [](const Vec3& p) { return std::abs(p.x()); });
   search.put("stomion", Vec3(0, middle->y(), middle->z()));
   search.put("mouth_right", crease.points.front());
   search.put("mouth_left", crease.points.back());

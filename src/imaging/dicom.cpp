@@ -122,9 +122,7 @@ Volume read_dicom(const std::filesystem::path& folder, const Watch& watch) {
                  folder.string(), count, frames);
   check_alike(slices);
   const Vec3 normal = first.axes.col(0).cross(first.axes.col(1)).normalized();
-  std::sort(slices.begin(), slices.end(), [&](const DicomSlice& a, const DicomSlice& b) {
-    return a.origin.dot(normal) < b.origin.dot(normal);
-  });
+  std::ranges::sort(slices, {}, [&](const DicomSlice& s) { return s.origin.dot(normal); });
   Volume volume{folder.string(),
                 {first.header.size[0], first.header.size[1], count * frames},
                 first.axes,

@@ -131,8 +131,7 @@ void Coarsening::find_candidates(const ColumnLevel& fine, const std::vector<int3
     if (j == i || j >= fine.own() || fine.place()[j].layer != fine.place()[i].layer) continue;
     const double strength = std::max(0.0f, pull(fine.block(k)));
     total += strength;
-    const auto same = std::find_if(found.begin(), found.end(),
-                                   [&](const Candidate& c) { return c.point == point[j]; });
+    const auto same = std::ranges::find(found, point[j], &Candidate::point);
     if (same == found.end())
       found.push_back({strength, point[j]});
     else

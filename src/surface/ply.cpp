@@ -96,16 +96,14 @@ class HeaderParser {
 };
 
 const PlyElement* find_element(const PlyHeader& header, bool (PlyElement::*is)() const) {
-  const auto found = std::find_if(header.elements.begin(), header.elements.end(),
-                                  [&](const PlyElement& e) { return (e.*is)(); });
+  const auto found = std::ranges::find_if(header.elements, is);
   return found == header.elements.end() ? nullptr : &*found;
 }
 
 void check_coordinates(const PlyElement& vertex, const std::string& file) {
   for (const char* axis : {"x", "y", "z"}) {
     const auto& all = vertex.properties;
-    const auto found =
-        std::find_if(all.begin(), all.end(), [&](const PlyProperty& p) { return p.name == axis; });
+    const auto found = std::ranges::find(all, axis, &PlyProperty::name);
     if (found == all.end())
       base::refuse("{}: its vertices have no property {}; export the mesh with x, y and z", file,
                    axis);
@@ -164,11 +162,10 @@ void check_ply(const PlyHeader& header, const Content& content) {
 
 size_t index_list(const PlyElement& face) {
   const auto& all = face.properties;
-  return std::find_if(all.begin(), all.end(),
-                      [](const PlyProperty& p) {
-                        return p.name == "vertex_indices" || p.name == "vertex_index";
-                      }) -
-         all.begin();
+  const auto is_list = [](const std::string& name) {
+    return name == "vertex_indices" || name == "vertex_index";
+  };
+  return std::ranges::find_if(all, is_list, &PlyProperty::name) - all.begin();
 }
 
 }  // namespace repose::surface

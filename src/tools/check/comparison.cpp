@@ -113,8 +113,7 @@ std::vector<Comparison::Row> Comparison::by_name() const {
   std::vector<Row> kinds;
   for (const Row& row : rows_) {
     if (row.kind != Row::recalculated) continue;
-    const auto same = std::find_if(kinds.begin(), kinds.end(),
-                                   [&](const Row& kind) { return kind.name == row.name; });
+    const auto same = std::ranges::find(kinds, row.name, &Row::name);
     if (same == kinds.end()) {
       kinds.push_back(row);
       continue;

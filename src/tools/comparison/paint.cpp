@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <map>
 
 #include "repose/base/error.h"
@@ -51,8 +52,7 @@ std::vector<Color> paints_of(const Held& held) {
   std::map<Color, size_t> count;
   for (const Color& value : held.values) ++count[value];
   std::vector<std::pair<Color, size_t>> frequent(count.begin(), count.end());
-  std::stable_sort(frequent.begin(), frequent.end(),
-                   [](const auto& one, const auto& other) { return one.second > other.second; });
+  std::ranges::stable_sort(frequent, std::greater(), &std::pair<Color, size_t>::second);
   std::vector<Color> paints;
   for (const auto& paint_and_vertices : frequent) {
     const Color& value = paint_and_vertices.first;
@@ -76,9 +76,8 @@ Paint::Paint(const std::filesystem::path& file) {
     names_.push_back(held.colors ? fmt::format("color {} {} {}", paint[0], paint[1], paint[2])
                                  : fmt::format("label {}", paint[0]));
   for (const Color& value : held.values) {
-    const auto nearest = std::min_element(
-        paints.begin(), paints.end(),
-        [&](const Color& a, const Color& b) { return apart(value, a) < apart(value, b); });
+    const auto off = [&](const Color& paint) { return apart(value, paint); };
+    const auto nearest = std::ranges::min_element(paints, {}, off);
     paint_.push_back(static_cast<int>(nearest - paints.begin()));
   }
   tree_ = tree_of_points(mesh.points);

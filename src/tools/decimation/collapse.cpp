@@ -42,14 +42,8 @@ double share_of_corner(const Corners& t, int k, const Vec3& point) {
 bool beside(const Corners& a, const Corners& b) {
   const Vec3 normal = scaled_normal(a);
   const double noise = 1e-10 * normal.norm() * (1 + a[0].norm());
-  double low = 0, high = 0;
-  bool first = true;
-  for (const Vec3& corner : b) {
-    const double height = normal.dot(corner - a[0]);
-    low = first ? height : std::min(low, height);
-    high = first ? height : std::max(high, height);
-    first = false;
-  }
+  const auto height = [&](const Vec3& corner) { return normal.dot(corner - a[0]); };
+  const auto [low, high] = std::minmax({height(b[0]), height(b[1]), height(b[2])});
   return low > noise || high < -noise;
 }
 

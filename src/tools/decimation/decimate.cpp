@@ -23,11 +23,8 @@ constexpr double least_share = 1e-9;
 constexpr double first_share = 5e-4, last_share = 0.1;
 
 int64_t nearest_vertex(const Surface& surface, const Vec3& point) {
-  const auto nearer = [&](const Vec3& a, const Vec3& b) {
-    return (a - point).squaredNorm() < (b - point).squaredNorm();
-  };
-  return std::min_element(surface.points.begin(), surface.points.end(), nearer) -
-         surface.points.begin();
+  const auto squared = [&](const Vec3& p) { return (p - point).squaredNorm(); };
+  return std::ranges::min_element(surface.points, {}, squared) - surface.points.begin();
 }
 
 void check_intersections(const Surface& result, const Surface& input) {

@@ -141,8 +141,7 @@ class Icp {
           "ICP: {} of {} samples of {} have a partner on {}, six are needed; the start is too far "
           "off: give landmarks of both, or check them",
           kept, points_.size(), moving_name_, fixed_.name);
-    std::nth_element(pairs.begin(), pairs.begin() + kept - 1, pairs.end(),
-                     [](const Pair& a, const Pair& b) { return a.squared < b.squared; });
+    std::ranges::nth_element(pairs, pairs.begin() + kept - 1, {}, &Pair::squared);
     pairs.resize(kept);
     return pairs;
   }
