@@ -26,7 +26,7 @@ DicomSlice describe(const std::filesystem::path& file) {
     base::refuse("{}: is a color picture, not a slice; move it elsewhere", file.string());
   if (slice.frames() == 1) slice.header.spacing[2] = 1;
   slice.axes = axes_of(slice.header, file.string());
-  slice.origin = origin_of(slice.header);
+  slice.origin = Vec3::Map(slice.header.origin.data());
   return slice;
 }
 

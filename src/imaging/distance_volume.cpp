@@ -49,10 +49,8 @@ class ClosestPoints {
   /// Each voxel offers its closest point to its neighbors until none is improved.
   std::vector<float> distances() {
     std::vector<Index> front, next;  // in the order of memory at first
-    for (Index at{0, 0, 0}; at[2] < grid_.size[2]; ++at[2])
-      for (at[1] = 0; at[1] < grid_.size[1]; ++at[1])
-        for (at[0] = 0; at[0] < grid_.size[0]; ++at[0])
-          if (changed_[grid_.index(at[0], at[1], at[2])]) front.push_back(at);
+    for (int64_t voxel = 0; voxel < std::ssize(changed_); ++voxel)
+      if (changed_[voxel]) front.push_back(grid_.index_of(voxel));
     for (; !front.empty(); front.swap(next)) {
       next.clear();
       for (const Index& at : front) propagate(at, next);

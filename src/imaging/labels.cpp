@@ -43,16 +43,14 @@ void smooth_axis(Volume& volume, int axis, const std::vector<float>& weights) {
 /// Where a label lies, as a box of voxels grown by `margin`, in mm; nothing where it is nowhere.
 Volume around(const Volume& labels, int64_t label, int64_t margin) {
   std::array<int64_t, 3> low = labels.size, high{0, 0, 0};
-  for (int64_t k = 0; k < labels.size[2]; ++k)
-    for (int64_t j = 0; j < labels.size[1]; ++j)
-      for (int64_t i = 0; i < labels.size[0]; ++i) {
-        if (labels.at(i, j, k) != static_cast<float>(label)) continue;
-        const std::array<int64_t, 3> here{i, j, k};
-        for (int axis = 0; axis < 3; ++axis) {
-          low[axis] = std::min(low[axis], here[axis]);
-          high[axis] = std::max(high[axis], here[axis] + 1);
-        }
-      }
+  for (int64_t voxel = 0; voxel < std::ssize(labels.values); ++voxel) {
+    if (labels.values[voxel] != static_cast<float>(label)) continue;
+    const auto here = labels.index_of(voxel);
+    for (int axis = 0; axis < 3; ++axis) {
+      low[axis] = std::min(low[axis], here[axis]);
+      high[axis] = std::max(high[axis], here[axis] + 1);
+    }
+  }
   if (high[0] == 0)
     base::refuse("{}: no voxel has the label {}; it has {}", labels.name, label,
                  fmt::join(labels_of(labels), ", "));

@@ -7,7 +7,6 @@ namespace repose::imaging {
 
 /// The axes of an image, in mm; refuses a spacing that is not a positive number.
 Mat3 axes_of(const Image& image, const std::string& name);
-Vec3 origin_of(const Image& image);
 
 /// The one series of DICOM slices in a folder, sorted along their normal; files of other kinds are
 /// passed over. Throws InputError for no or several series, and for slices that do not belong

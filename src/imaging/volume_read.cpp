@@ -47,7 +47,7 @@ Volume read_file(const std::filesystem::path& file) {
   Volume volume{name,
                 {image.size[0], image.size[1], image.size[2]},
                 axes_of(image, name),
-                origin_of(image),
+                Vec3::Map(image.origin.data()),
                 {},
                 {}};
   check_stored_bytes(file, format, image);
@@ -91,8 +91,6 @@ Mat3 axes_of(const Image& image, const std::string& name) {
   }
   return axes;
 }
-
-Vec3 origin_of(const Image& image) { return {image.origin[0], image.origin[1], image.origin[2]}; }
 
 Mat3 inverse_axes(const Volume& volume) { return volume.axes.inverse(); }
 
