@@ -31,12 +31,10 @@ SignedDistance::SignedDistance(const Surface& surface)
 SignedDistance::Feature SignedDistance::feature_at(const DistanceTree::Nearest& nearest) const {
   const Triangle& triangle = surface_.triangles[nearest.triangle];
   const Vec3 weight = barycentric(corners(surface_, triangle), nearest.point);
-  int small = 0, smallest = 0, largest = 0;
-  for (int k = 0; k < 3; ++k) {
-    small += weight[k] < on_border_of_triangle;
-    if (weight[k] < weight[smallest]) smallest = k;
-    if (weight[k] > weight[largest]) largest = k;
-  }
+  const auto small = (weight.array() < on_border_of_triangle).count();
+  int smallest = 0, largest = 0;
+  weight.minCoeff(&smallest);
+  weight.maxCoeff(&largest);
   if (small == 0) return {face_normal_[nearest.triangle], false};
   if (small == 1) return side_[nearest.triangle][(smallest + 1) % 3];
   return {vertex_normal_[triangle[largest]], vertex_on_border_[triangle[largest]] != 0};

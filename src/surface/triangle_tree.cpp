@@ -41,14 +41,8 @@ Vec3 barycentric(const Corners& t, const Vec3& point) {
 
 int longest_edge(const Corners& t) {
   int longest = 0;
-  double length = 0;
-  for (int k = 0; k < 3; ++k) {
-    const double squared = (t[(k + 1) % 3] - t[k]).squaredNorm();
-    if (squared > length) {
-      length = squared;
-      longest = k;
-    }
-  }
+  Vec3((t[1] - t[0]).squaredNorm(), (t[2] - t[1]).squaredNorm(), (t[0] - t[2]).squaredNorm())
+      .maxCoeff(&longest);
   return longest;
 }
 
