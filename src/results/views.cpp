@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include <map>
+#include <set>
 
 namespace repose::results {
 
@@ -45,22 +45,15 @@ std::string unit_of(const std::string& name) {
   if (name.starts_with("tangent_young_")) return "mm";
   if (name.starts_with("tangent_"))
     return name[name.size() - 2] == 't' ? "mm per mm" : "mm per degree";
-  static const std::map<std::string, std::string> units = {{"displacement", "mm"},
-                                                           {"initial_position", "mm"},
-                                                           {"advance", "mm"},
-                                                           {"discretisation_error", "mm"},
-                                                           {"contact_gap", "mm"},
-                                                           {"elongation", "mm"},
-                                                           {"other_rest_displacement", "mm"},
-                                                           {"rest_length", "mm"},
-                                                           {"residual_force", "N"},
-                                                           {"contact_force", "N"},
-                                                           {"tension", "N"},
-                                                           {"contact_pressure", "MPa"},
-                                                           {"pressure", "MPa"},
-                                                           {"von_mises", "MPa"}};
-  const auto found = units.find(name);
-  return found == units.end() ? "" : found->second;
+  static const std::vector<std::pair<const char*, std::set<std::string>>> units = {
+      {"mm",
+       {"displacement", "initial_position", "advance", "discretisation_error", "contact_gap",
+        "elongation", "other_rest_displacement", "rest_length"}},
+      {"N", {"residual_force", "contact_force", "tension"}},
+      {"MPa", {"contact_pressure", "pressure", "von_mises"}}};
+  for (const auto& [unit, fields] : units)
+    if (fields.contains(name)) return unit;
+  return "";
 }
 
 XdmfBlock tissue(const FileCounts& counts, size_t steps) {
