@@ -30,9 +30,9 @@ struct Probe {
 };
 
 /// Landmarks as a person would take them, each found by a straight probe.
-const std::vector<Probe>& probes() {
+std::map<std::string, Vec3> landmarks() {
   const Vec3 back(0, 1, 0), up(0, 0, 1), down(0, 0, -1), left(1, 0, 0), right(-1, 0, 0);
-  static const std::vector<Probe> table{
+  const std::vector<Probe> probes{
       {"glabella_soft", skin_distance, {0, -200, 60}, back},
       {"nasion_soft", skin_distance, {0, -200, 47}, back},
       {"pronasale", skin_distance, {0, -200, 15.5}, back},
@@ -56,13 +56,9 @@ const std::vector<Probe>& probes() {
       {"condyle_left_lateral_pole", mandible_distance, {80, 0, 0}, right},
       {"coronoid_right_tip", mandible_distance, {-46, -36, 30}, down},
       {"coronoid_left_tip", mandible_distance, {46, -36, 30}, down}};
-  return table;
-}
-
-std::map<std::string, Vec3> landmarks() {
   std::map<std::string, Vec3> result{{"condyle_right_center", {-50, 0, 0}},
                                      {"condyle_left_center", {50, 0, 0}}};
-  for (const Probe& probe : probes())
+  for (const Probe& probe : probes)
     result[probe.name] = first_met(probe.solid, probe.from, probe.direction);
   return result;
 }
