@@ -138,12 +138,8 @@ std::vector<LinearGap> BodyContact::linear_gaps(std::span<const Vec3> position, 
     else if (!measure_within(reach, smoothed_to, c, beside))
       continue;
     if (normal_[c].isZero(0)) continue;
-    gaps.push_back({c,
-                    slides(c),
-                    pairs_.area[c],
-                    gap_[c],
-                    {{static_cast<int32_t>(pairs_.point[c]), normal_[c]}},
-                    {}});
+    const auto point = static_cast<int32_t>(pairs_.point[c]);
+    gaps.push_back({c, slides(c), pairs_.area[c], gap_[c], {{point, normal_[c]}}, {}});
   }
   return gaps;
 }

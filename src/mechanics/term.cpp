@@ -43,8 +43,7 @@ const Term& term_of(const model::TermElements& elements) {
   if (found == known_terms().end())
     base::refuse(
         "the model has elements of an energy \"{}\", which this program does not define; use the "
-        "one "
-        "that made it",
+        "one that made it",
         elements.term);
   const Term& term = *found->second;
   if (term.points() != elements.points_each || term.numbers() != elements.numbers_each)
