@@ -1,7 +1,6 @@
 #include "repose/adapt/transfer.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "repose/surface/distance.h"
 #include "repose/surface/triangle_tree.h"

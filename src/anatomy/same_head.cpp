@@ -1,6 +1,5 @@
 #include "repose/anatomy/same_head.h"
 
-#include <algorithm>
 #include <cmath>
 #include <deque>
 

@@ -4,7 +4,6 @@
 #include "mean_near_largest.h"
 #include "repose/scene/jaw_height.h"
 #include "repose/surface/edges.h"
-#include "scan_end.h"
 #include "search.h"
 
 namespace repose::anatomy {

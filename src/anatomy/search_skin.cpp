@@ -2,7 +2,6 @@
 #include <cmath>
 
 #include "lip_crease.h"
-#include "scan_end.h"
 #include "search.h"
 
 namespace repose::anatomy {

@@ -1,6 +1,5 @@
 #include <Eigen/LU>
 #include <algorithm>
-#include <cmath>
 
 #include "repose/imaging/volume_filter.h"
 

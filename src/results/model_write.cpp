@@ -2,7 +2,6 @@
 
 #include <map>
 #include <sstream>
-#include <type_traits>
 
 #include "writer.h"
 

@@ -1,6 +1,5 @@
 #include "repose/results/result_file.h"
 
-#include <algorithm>
 #include <mutex>
 
 #include "model_write.h"

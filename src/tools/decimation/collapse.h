@@ -1,16 +1,11 @@
 #pragma once
 #include <functional>
-#include <memory>
 
 #include "quadric.h"
 #include "repose/tools/decimation/decimate.h"
 #include "tolerance.h"
 
 namespace repose::tools::decimation {
-
-using surface::Corners;
-using surface::Surface;
-using surface::TriangleTree;
 
 /// Edge collapse on a manifold surface, open or closed, step by step. A step is taken only where
 /// the topology stays (link condition), no triangle turns over or loses its shape, all new

@@ -16,7 +16,6 @@ class Piece {
   explicit Piece(const Corners& triangle);
 
   std::span<const Vec3> corners() const { return {at_.data(), static_cast<size_t>(count_)}; }
-  bool empty() const { return count_ == 0; }
   Vec3 center() const;
 
   /// Appends the parts that the piece is cut into by the edges of `triangle`, where that is several

@@ -1,6 +1,5 @@
 #include "tolerance.h"
 
-#include <algorithm>
 #include <cmath>
 
 namespace repose::tools::decimation {

@@ -1,12 +1,10 @@
 #pragma once
-#include <optional>
 
 #include "piece.h"
 #include "repose/surface/triangle_tree.h"
 
 namespace repose::tools::decimation {
 
-using surface::Corners;
 using surface::TriangleTree;
 
 /// The points within a distance of a surface, and proofs that triangles lie among them.
