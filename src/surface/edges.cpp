@@ -1,6 +1,7 @@
 #include "repose/surface/edges.h"
 
 #include <Eigen/Geometry>
+#include <boost/container_hash/hash.hpp>
 #include <functional>
 #include <map>
 #include <tuple>
@@ -11,20 +12,7 @@
 namespace repose::surface {
 namespace {
 
-struct Cell {
-  int64_t x, y, z;
-  bool operator==(const Cell&) const = default;
-};
-
-struct CellHash {
-  size_t operator()(const Cell& c) const {
-    const auto mix = [](uint64_t h, int64_t v) {
-      h = (h ^ static_cast<uint64_t>(v)) * 0x9E3779B97F4A7C15u;
-      return h ^ (h >> 29);
-    };
-    return mix(mix(mix(0, c.x), c.y), c.z);
-  }
-};
+using Cell = std::array<int64_t, 3>;
 
 /// Points put into cubes four tolerances wide, so that few neighbors need a look.
 class PointGrid {
@@ -37,9 +25,9 @@ class PointGrid {
     const Vec3 reach = Vec3::Constant(tolerance_);
     const Cell from = cell(query - reach), to = cell(query + reach);
     int64_t found = -1;
-    for (int64_t x = from.x; x <= to.x; ++x)
-      for (int64_t y = from.y; y <= to.y; ++y)
-        for (int64_t z = from.z; z <= to.z; ++z) search_cell({x, y, z}, query, found);
+    for (int64_t x = from[0]; x <= to[0]; ++x)
+      for (int64_t y = from[1]; y <= to[1]; ++y)
+        for (int64_t z = from[2]; z <= to[2]; ++z) search_cell({x, y, z}, query, found);
     return found;
   }
 
@@ -67,7 +55,7 @@ class PointGrid {
   const std::vector<Vec3>& points_;
   Vec3 origin_;
   double tolerance_;
-  std::unordered_map<Cell, int64_t, CellHash> heads_;
+  std::unordered_map<Cell, int64_t, boost::hash<Cell>> heads_;
   std::vector<int64_t> next_;
 };
 
