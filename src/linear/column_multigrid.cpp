@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "repose/base/collective.h"
+
 namespace repose::linear {
 
 using base::check;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "repose/surface/edges.h"
 #include "repose/surface/intersections.h"
 #include "repose/surface/read.h"
 
