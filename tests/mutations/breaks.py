@@ -201,7 +201,7 @@ BREAKS = [
     # contact
     (
         "contact found too late",
-        "return found ? -1 : contact_margin;",
+        "return found ? -1 : margin;",
         "return found ? -1 : 0;",
         r"^surface\.collision|^model\.collision",
     ),
