@@ -152,7 +152,7 @@ std::vector<Vec3> steps_around() {
   for (int n = 0; n < 27; ++n) {
     const Vec3 way(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1);
     if (way.isZero(0)) continue;
-    for (const double radius : {1.0, 2.0}) steps.push_back(radius * way.normalized());
+    for (const double radius : {1.0, 2.0, 3.0}) steps.push_back(radius * way.normalized());
   }
   return steps;
 }
@@ -160,10 +160,10 @@ std::vector<Vec3> steps_around() {
 }  // namespace
 
 /// The gaps to first order of a constraint's point to tangent planes of its body around it, at most
-/// 2 mm deep, whose normals are more than 60° from the one at the latest update.
-std::vector<LinearGap> BodyContact::gaps_round_edge(size_t c,
-                                                    std::span<const Vec3> position) const {
-  constexpr double deepest = 2, largest_cosine = 0.5;
+/// `deepest` mm deep, whose normals are more than 60° from the one at the latest update.
+std::vector<LinearGap> BodyContact::gaps_round_edge(size_t c, std::span<const Vec3> position,
+                                                    double deepest) const {
+  constexpr double largest_cosine = 0.5;
   static const std::vector<Vec3> steps = steps_around();
   const RigidBody& body = bodies_[pairs_.body[c]];
   const auto point = static_cast<int32_t>(pairs_.point[c]);
@@ -181,11 +181,12 @@ std::vector<LinearGap> BodyContact::gaps_round_edge(size_t c,
 }
 
 std::set<int32_t> BodyContact::bodies_near_edges(std::span<const Vec3> position) const {
+  constexpr double near = 2;  // mm
   std::set<int32_t> found;
   for (size_t c = 0; c < pairs_.point.size(); ++c) {
     const bool touches = multiplier_[c] > 0 || slides(c);
     if (!touches || normal_[c].isZero(0) || found.contains(pairs_.body[c])) continue;
-    if (!gaps_round_edge(c, position).empty()) found.insert(pairs_.body[c]);
+    if (!gaps_round_edge(c, position, near).empty()) found.insert(pairs_.body[c]);
   }
   return found;
 }

@@ -45,10 +45,17 @@ double softness(const mechanics::LinearGap& other, const Mat3& compliance, const
   return -other.gap / reach;
 }
 
+/// Returns true for sides of one constraint whose normals are less than 45° apart.
+bool alike(const OtherSide& a, const OtherSide& b) {
+  constexpr double cosine = 0.7;
+  return a.gap.constraint == b.gap.constraint &&
+         a.gap.gradient.front().second.dot(b.gap.gradient.front().second) > cosine;
+}
+
 /// Returns the sides, of this rank's points, that may have less energy than those pressed on at
 /// `displacement`, where the objective was updated last: in a model of one point, whose compliance
-/// is a few times the inverse of its block of the Hessian. Softness ascends; of the sides of one
-/// constraint it is the softest. Collective.
+/// is a few times the inverse of its block of the Hessian. Softness ascends; of sides of a
+/// constraint with normals less than 45° apart it is the softest. Collective.
 std::vector<OtherSide> promising_sides(discrete::Objective& objective, discrete::Tangent& tangent,
                                        Vec displacement) {
   constexpr double softest = 4;
@@ -63,9 +70,11 @@ std::vector<OtherSide> promising_sides(discrete::Objective& objective, discrete:
     if (s > 0 && s < softest) found.push_back({std::move(gap), s});
   }
   std::ranges::sort(found, {}, &OtherSide::softness);
-  std::set<size_t> seen;
-  std::erase_if(found, [&](const OtherSide& s) { return !seen.insert(s.gap.constraint).second; });
-  return found;
+  std::vector<OtherSide> apart;
+  for (OtherSide& side : found)
+    if (std::ranges::none_of(apart, [&](const OtherSide& other) { return alike(side, other); }))
+      apart.push_back(std::move(side));
+  return apart;
 }
 
 /// Returns true if an energy is less than that of the rest position so far, by more than rounding.
@@ -216,7 +225,7 @@ OtherRestSearch::End OtherRestSearch::change_side(const OtherSide* side, Vec dis
 /// position that is left is the outcome's other one. Returns whether there was one. Collective.
 bool OtherRestSearch::change_sides(Vec displacement, double accuracy, std::set<size_t>& tried,
                                    Outcome& outcome) {
-  constexpr int max_failed = 3;  // in a row
+  constexpr int max_failed = 6;  // in a row
   constexpr double none = std::numeric_limits<double>::infinity();
   discrete::Positions& positions = objective_.positions();
   double value = programs_.evaluate(displacement);

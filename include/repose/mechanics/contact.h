@@ -90,7 +90,7 @@ class BodyContact {
   /// Returns the bodies on which points press or slide near edges, ascending. At the latest update.
   std::set<int32_t> bodies_near_edges(std::span<const Vec3> position) const;
   /// Gaps to first order of points that press on a body near an edge of it, from the body's sides
-  /// round that edge: negative, at most 2 mm, from planes more than 60° from the one pressed on,
+  /// round that edge: negative, at most 3 mm, from planes more than 60° from the one pressed on,
   /// those of a constraint one after the other. At the latest update.
   std::vector<LinearGap> other_sides(std::span<const Vec3> position) const;
   /// Calls visit(point, block) for the curvature −a p ∇²φ of the multipliers at gaps just made.
@@ -134,7 +134,8 @@ class BodyContact {
   Pressing now(size_t c) const {
     return released(c) ? Pressing{} : press(gap_[c], multiplier_[c], stiffness_, slides(c));
   }
-  std::vector<LinearGap> gaps_round_edge(size_t c, std::span<const Vec3> position) const;
+  std::vector<LinearGap> gaps_round_edge(size_t c, std::span<const Vec3> position,
+                                         double deepest = 3) const;
   void measure(size_t c, const Vec3& beside);
   bool measure_within(double reach, double smoothed_to, size_t c, const Vec3& beside);
   void set(size_t c, const Vec3& beside, const surface::Distance& distance);
