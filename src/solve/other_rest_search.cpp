@@ -197,7 +197,7 @@ void OtherRestSearch::consider(Vec displacement, const discrete::ContactPressure
 /// the gaps that are left. Collective; `side` is null on ranks that do not own the point.
 OtherRestSearch::End OtherRestSearch::change_side(const OtherSide* side, Vec displacement,
                                                   double accuracy) {
-  constexpr double promising = 0.4;  // of the work of the contact's force over the gap
+  constexpr double promising = 0.2;  // of the work of the contact's force over the gap
   check(VecCopy(displacement, start_));
   const double value_here = programs_.evaluate(start_);
   const double energy_here = programs_.without_contact(value_here);
