@@ -462,7 +462,7 @@ BREAKS = [
     ),
     (
         "points at an edge stay on their side",
-        "constexpr int max_failed = 3;",
+        "constexpr int max_failed = 6;",
         "constexpr int max_failed = 0;",
         r"^program\.contact$",
     ),
