@@ -238,7 +238,7 @@ struct Contact {
 struct Incision {
   std::vector<Vec3> path;     ///< mm, at least two points on or near the skin
   int layers;                 ///< point layers that it parts, from the skin down, ≥ 1
-  std::string name = {};      ///< where the scene tells of it
+  std::string name = {};      ///< its key, for messages
   bool by_landmarks = false;  ///< found on the skin that the scene names
   bool parts_lips() const { return name == "mouth"; }
 };
