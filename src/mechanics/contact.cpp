@@ -222,11 +222,9 @@ void BodyContact::carry(std::span<const Vec3> position, std::span<const RigidBod
 }
 
 double BodyContact::measure_gap(size_t c, std::span<const Vec3> position) {
-  constexpr double smoothed_to = 1;  // mm
   const RigidBody& body = bodies_[pairs_.body[c]];
   const Vec3 beside = body.beside(position[pairs_.point[c]]);
-  const double needed = exact_from(c, smoothed_to);
-  const bool away = !slides(c) && body.lower_bound(beside, needed) >= needed;
+  const bool away = !slides(c) && body.lower_bound(beside, 0) >= 0;
   set(c, beside, away ? body.outside(beside) : body.distance(beside));
   return gap_[c];
 }

@@ -432,14 +432,13 @@ class Contact:
             if not isinstance(body, Mesh):
                 continue
             bone, grid = self.file.model["contact/body_bone"][d], self.file.contact["grid"]
-            rows = np.flatnonzero((self.body == d) & ~self.slides & (gap > 0.5))
+            rows = np.flatnonzero((self.body == d) & ~self.slides & (gap >= 0))
             turn, shift = moved[bone] if bone >= 0 else \
                 (np.eye(3), load * self.file.model["contact/body_push"][d])
             rows = rows[body.lower_bound((position[self.point[rows]] - shift) @ turn) < GAP_LIMIT]
             exact = body.exact((position[self.point[rows]] - shift) @ turn)
-            exact = np.minimum(exact, body.reach) - self.offset[rows]
-            away = exact >= 1 + 1.67 * grid + 1e-5
-            gap[rows[away]] = exact[away]
+            away = exact >= 1.67 * grid + 1e-5
+            gap[rows[away]] = (np.minimum(exact, body.reach) - self.offset[rows])[away]
         return gap
 
     def exact_penetration(self, position, load):

@@ -155,7 +155,6 @@ class Bodies {
 void add_bodies(const model::Model& model, const Bodies& bodies, const std::vector<Vec3>& position,
                 double slack, Truth& truth) {
   const model::ContactPairs& pairs = model.contact.pairs;
-  constexpr double exact_from = 1;  // mm, of gaps
   for (size_t c = 0; c < pairs.point.size(); ++c) {
     const int64_t row = pairs.point[c];
     const int32_t body = pairs.body[c];
@@ -167,7 +166,7 @@ void add_bodies(const model::Model& model, const Bodies& bodies, const std::vect
     if (slides || exact_before < (mesh ? bodies.smoothing() : 0))
       offset = bodies.solver_distance(body, before);
     if (!slides) offset = std::min(offset, 0.0);
-    const bool away = mesh && !slides && exact - offset >= exact_from + bodies.smoothing();
+    const bool away = mesh && !slides && exact >= bodies.smoothing();
     const double gap = (away ? exact : bodies.solver_distance(body, beside)) - offset;
     AtPoint& point = truth.points[row];
     point.slides = point.slides || slides;
