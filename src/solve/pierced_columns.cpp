@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <span>
 #include <vector>
 
@@ -155,9 +156,11 @@ Sample deepest_in_prism(const std::array<Vec3, 6>& x, bool at_skin, double apart
                         const Sampling& rule, const mechanics::RigidBody& body) {
   constexpr int finest = 16;
   constexpr double cut_share = 0.25;
+  const Vec3 middle = std::accumulate(x.begin(), x.end(), Vec3(0, 0, 0)) / x.size();
+  double enough = -rule.min_depth;
+  for (const Vec3& corner : x) enough = std::max(enough, (corner - middle).norm() - rule.min_depth);
+  if (body.lower_bound(body.beside(middle), enough) >= enough) return {};
   const double longest = longest_edge(x);
-  const double reach = longest + (x[3] - x[0]).norm();
-  if (body.lower_bound(body.beside((x[0] + x[5]) / 2), reach) >= reach) return {};
   const int parts = std::clamp(static_cast<int>(std::ceil(longest / apart)), 2, finest);
   Sample deepest;
   for (int i = 0; i <= parts; ++i)
