@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <unordered_map>
 #include <utility>
 
@@ -193,18 +194,22 @@ class DistanceField::Values {
   /// farther than `reach`.
   double enough_far() const { return grid_.reach + b * grid_.spacing; }
 
-  /// Exact up to rounding where it is below `reach`, otherwise `reach` or more. The surface is not
-  /// nearer to the last point than the last distance, from which much follows without a search.
+  /// Exact up to rounding where it is below `reach`, otherwise `reach` or more. Where the last point
+  /// is nearer than the surface is to it or to this one, both are on one side.
   double signed_distance(const Index& at) {
     const Vec3 point = grid_.point(at);
     const double travel = (1 + 1e-9) * (point - last_point_).norm();
-    const bool same_side = travel < std::abs(last_distance_);
-    if (same_side && last_distance_ - travel >= grid_.reach) return last_distance_ - travel;
+    if (travel < last_distance_ && last_distance_ - travel >= grid_.reach)
+      return last_distance_ - travel;
     TriangleTree::Nearest nearest = tree_.nearest(point, search_limit(point));
+    double distance = nearest.triangle < 0 ? enough_far() : std::sqrt(nearest.squared);
+    const bool same_side = travel < std::max(std::abs(last_distance_), distance);
     const bool inside = same_side ? last_distance_ < 0 : is_inside(at, point);
-    if (nearest.triangle < 0 && inside) nearest = tree_.nearest(point);
+    if (nearest.triangle < 0 && inside) {
+      nearest = tree_.nearest(point);
+      distance = std::sqrt(nearest.squared);
+    }
     if (nearest.triangle >= 0) last_triangle_ = nearest.triangle;
-    const double distance = nearest.triangle < 0 ? enough_far() : std::sqrt(nearest.squared);
     last_point_ = point;
     last_distance_ = inside ? -distance : distance;
     return last_distance_;
@@ -232,7 +237,7 @@ class DistanceField::Values {
   std::vector<float> middle_;       // [kept blocks] mm, a value in the middle
   TriangleTree tree_;
   std::unordered_map<int64_t, std::vector<LineCrossing>> lines_;  // by (j, k)
-  Vec3 last_point_ = Vec3::Zero();
+  Vec3 last_point_ = Vec3::Constant(std::numeric_limits<double>::infinity());
   double last_distance_ = 0;
   int64_t last_triangle_ = -1;
 };
