@@ -15,8 +15,7 @@ using mechanics::LinearGap;
 
 namespace {
 
-// mm: gaps beyond the first do not close in a step; beyond the second the exact distance serves.
-constexpr double farthest = 5, smoothed_to = 1;
+constexpr double smoothed_to = 1;  // mm: of gaps beyond the exact distance serves
 
 double change(const LinearGap& gap, std::span<const Vec3> moved) {
   double change = 0;
@@ -32,12 +31,12 @@ ContactGaps::ContactGaps(discrete::Objective& objective)
       moved_(objective.positions().local().size(), Vec3::Zero()),
       forces_(objective.positions().make_vector()) {}
 
-void ContactGaps::linearize(Vec displacement) {
+void ContactGaps::linearize(Vec displacement, double reach) {
   objective_.positions().update(displacement);
   objective_.contact().place_bodies();
-  gaps_ = objective_.contact().bodies().linear_gaps(objective_.positions().local(), farthest,
-                                                    smoothed_to);
-  add_gaps();
+  gaps_ =
+      objective_.contact().bodies().linear_gaps(objective_.positions().local(), reach, smoothed_to);
+  add_gaps(reach);
 }
 
 void ContactGaps::linearize(Vec displacement, double load, std::span<const Vec3> travel) {
@@ -53,17 +52,18 @@ void ContactGaps::linearize(Vec displacement, double load, std::span<const Vec3>
   positions.update(displacement);
   objective_.contact().bodies().carry(positions.local(), bodies, gaps_);
   objective_.contact().place_bodies();
-  add_gaps();
+  add_gaps(farthest);
   for (size_t k = touching_; k < gaps_.size(); ++k)
     for (const auto& [p, gradient] : gaps_[k].gradient) gaps_[k].gap += gradient.dot(travel[p]);
 }
 
-void ContactGaps::add_gaps() {
+/// Adds those of cuts, and takes multipliers and curvature of all.
+void ContactGaps::add_gaps(double reach) {
   mechanics::BodyContact& bodies = objective_.contact().bodies();
   mechanics::CutFaceContact& cuts = objective_.contact().cut_faces();
   touching_ = gaps_.size();
   cuts.update_gaps(objective_.positions().local());
-  std::ranges::copy(cuts.linear_gaps(farthest), std::back_inserter(gaps_));
+  std::ranges::copy(cuts.linear_gaps(reach), std::back_inserter(gaps_));
   state_.assign(gaps_.size(), {});
   const discrete::ContactPressures multipliers = objective_.contact().multipliers();
   for (size_t k = 0; k < gaps_.size(); ++k) state_[k].multiplier = multipliers[constraint(k)];

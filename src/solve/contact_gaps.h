@@ -16,8 +16,10 @@ class ContactGaps {
 
   void set_stiffness(double stiffness) { stiffness_ = stiffness; }  ///< K, N/mm³
 
-  /// Takes the gaps at `displacement`. Collective.
-  void linearize(Vec displacement);
+  static constexpr double farthest = 5;  ///< mm: gaps beyond do not close in a step
+
+  /// Takes the gaps at `displacement` of at most `reach` mm. Collective.
+  void linearize(Vec displacement, double reach = farthest);
   /// Takes them where bodies and fixed points move on to `load`: each point stays beside the place
   /// of its body that it is beside. `travel` [local points] mm, of fixed points. Collective.
   void linearize(Vec displacement, double load, std::span<const Vec3> travel);
@@ -56,7 +58,7 @@ class ContactGaps {
   void give_multipliers();  ///< to the objective; not collective
 
  private:
-  void add_gaps();
+  void add_gaps(double reach);
   /// Row of a gap in discrete::ContactPressures.
   size_t constraint(size_t k) const {
     const size_t before = k < touching_ ? 0 : objective_.contact().bodies().gaps().size();

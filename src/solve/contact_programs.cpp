@@ -60,38 +60,48 @@ double ContactPrograms::without_contact(double value) {
 /// Takes step_, whose largest block is `length` mm, or less of it, where that lowers the augmented
 /// Lagrangian of the new multipliers from `tissue`, the value without contact. Its full length is
 /// tried first, or as much as the gaps, taken to first order, may hold for.
-double ContactPrograms::take_step(Vec displacement, double length, double tissue, double& value) {
+double ContactPrograms::take_step(Vec displacement, double length, double tissue) {
   constexpr int max_halved = 6;
   constexpr double rounding = 1e-12;
   constexpr double longest = 2;  // mm
   const auto try_step = [&](double share) {
     check(VecCopy(displacement, trial_));
     check(VecAXPY(trial_, share, step_));
-    return objective_.evaluate(trial_, gradient_);
+    return evaluate(trial_);
   };
   const double merit = tissue + objective_.weights().elastic * objective_.contact_value();
   const double largest = merit + rounding * std::abs(merit);
   double share = std::min(1.0, longest / length);
-  value = try_step(share);
-  for (int k = 0; k < max_halved && value > largest; ++k) value = try_step(share /= 2);
-  if (value > largest) return 0;
+  try_step(share);
+  for (int k = 0; k < max_halved && value_ > largest; ++k) try_step(share /= 2);
+  if (value_ > largest) {
+    evaluate(displacement);
+    return 0;
+  }
   check(VecCopy(trial_, displacement));
   return share;
 }
 
-ContactPrograms::End ContactPrograms::run(Vec displacement, double accuracy, int64_t& iterations,
-                                          int max_steps) {
+ContactPrograms::End ContactPrograms::run(Vec displacement, double accuracy, int64_t& iterations) {
+  evaluate(displacement);
+  return go_on(displacement, accuracy, iterations);
+}
+
+ContactPrograms::End ContactPrograms::go_on(Vec displacement, double accuracy, int64_t& iterations,
+                                            int max_steps) {
   constexpr double near = 0.5, finer = 0.1;  // of the accuracy: a step that ends; a program's
   constexpr double at_saddle = 0.05;         // mm: such steps do not leave a saddle
   constexpr double fast = 0.2;               // ratio of full steps that is trusted
-  double value = objective_.evaluate(displacement, gradient_);
+  constexpr double nearest = 1;              // mm
   last_step_ = 0;
+  double reach = ContactGaps::farthest;
   for (int n = 0; n < max_steps; ++n) {
-    const double tissue = without_contact(value);
-    linearize(displacement);
+    const double tissue = without_contact(value_);
+    linearize(displacement, reach);
     if (!qp_.solve(displacement, slope_, finer * accuracy, step_)) return End::failed;
     const double length = discrete::largest_block(step_);
-    const double share = take_step(displacement, length, tissue, value);
+    reach = std::clamp(2 * length, nearest, ContactGaps::farthest);
+    const double share = take_step(displacement, length, tissue);
     if (share == 0) return End::failed;
     const double before = std::exchange(last_step_, share == 1 ? length : 0);
     ++iterations;
@@ -99,7 +109,7 @@ ContactPrograms::End ContactPrograms::run(Vec displacement, double accuracy, int
     const bool falls = last_step_ > 0 && last_step_ <= fast * before;
     const double next = falls ? length * length / before : length;
     if (!qp_.reduced() && next <= near * accuracy) return End::reached;
-    if (watch_ && !watch_({iterations, objective_.positions().load(), value,
+    if (watch_ && !watch_({iterations, objective_.positions().load(), value_,
                            discrete::largest_block(gradient_), length, objective_.evaluations(),
                            displacement}))
       return End::stopped;
@@ -116,9 +126,9 @@ bool ContactPrograms::leave_lower_saddle(Vec displacement, double& latest) {
   return leave_saddle(objective_, solver_, displacement);
 }
 
-void ContactPrograms::linearize(Vec displacement) {
+void ContactPrograms::linearize(Vec displacement, double reach) {
   subtract_contact();
-  qp_.gaps().linearize(displacement);
+  qp_.gaps().linearize(displacement, reach);
 }
 
 bool ContactPrograms::step_with(std::span<const mechanics::LinearGap> gaps, Vec displacement) {

@@ -21,7 +21,9 @@ class ContactPrograms {
   enum class End { reached, failed, stopped };
   /// Takes steps until one is shorter than half of `accuracy`, or the next would be: full steps
   /// fall by at least the ratio of the latest two. Adds to `iterations`.
-  End run(Vec displacement, double accuracy, int64_t& iterations, int max_steps = 12);
+  End run(Vec displacement, double accuracy, int64_t& iterations);
+  /// The same from a `displacement` that was evaluated last.
+  End go_on(Vec displacement, double accuracy, int64_t& iterations, int max_steps = 12);
   /// Returns whether the latest program met negative curvature.
   bool reduced() const { return qp_.reduced(); }
   /// Returns the full step that the latest run ended with, mm, or 0; from then on 0.
@@ -32,15 +34,18 @@ class ContactPrograms {
   bool leave_lower_saddle(Vec displacement, double& latest);
 
   /// Evaluates the augmented Lagrangian, N mm.
-  double evaluate(Vec displacement) { return objective_.evaluate(displacement, gradient_); }
+  double evaluate(Vec displacement) {
+    return value_ = objective_.evaluate(displacement, gradient_);
+  }
+  double value() const { return value_; }  ///< that was evaluated last; after run(), of its end
   /// N, largest block of the gradient that was evaluated last.
   double largest_force() const { return discrete::largest_block(gradient_); }
   /// Evaluates the energy of the tissue and its loads without contact, N mm.
   double evaluate_tissue(Vec displacement) { return without_contact(evaluate(displacement)); }
   /// The energy of `value`, the latest that was evaluated, without its part of contact, N mm.
   double without_contact(double value);
-  /// Takes the gaps at `displacement`, which was evaluated last.
-  void linearize(Vec displacement);
+  /// Takes the gaps of at most `reach` mm at `displacement`, which was evaluated last.
+  void linearize(Vec displacement, double reach = ContactGaps::farthest);
   /// Takes the step of one program from the `displacement` of linearize(), with these gaps of
   /// bodies, of this rank, in place of those of the same constraints. Returns whether it has a
   /// minimum.
@@ -48,14 +53,14 @@ class ContactPrograms {
 
  private:
   void subtract_contact();
-  double take_step(Vec displacement, double length, double tissue, double& value);
+  double take_step(Vec displacement, double length, double tissue);
 
   discrete::Objective& objective_;
   discrete::Tangent& tangent_;
   linear::TangentSolver& solver_;
   ContactQp qp_;
   Minimizer::Watch watch_;
-  double last_step_ = 0;
+  double value_ = 0, last_step_ = 0;
   base::VecHandle gradient_, slope_, step_, trial_;  // slope_: the gradient without contact
 };
 

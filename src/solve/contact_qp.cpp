@@ -28,8 +28,8 @@ void ContactQp::set_blocks() {
 /// active sets, with the least along each.
 bool ContactQp::minimize(Vec displacement, Vec slope, double tolerance, Vec step) {
   constexpr int max_sets = 30;
-  constexpr double coarse = 0.1, share_left = 0.1;  // of a linear system; of the step
-  bool full = false;                                // the latest step was not shortened
+  constexpr double coarse = 0.05, share_left = 0.1;  // of a linear system; of the step
+  bool full = false;                                 // the latest step was not shortened
   for (int set = 0; set < max_sets; ++set) {
     const bool changed = gaps_.choose_active();
     if (full && !changed) return true;
@@ -48,7 +48,7 @@ bool ContactQp::minimize(Vec displacement, Vec slope, double tolerance, Vec step
     check(VecDot(force_, direction_, &along));
     check(VecDot(slope, direction_, &held));
     const double share = gaps_.line_search(along + held, curvature);
-    full = std::abs(share - 1) <= coarse;
+    full = std::abs(share - 1) <= share_left;
     check(VecAXPY(step, share, direction_));
     check(VecAXPY(force_, share, change_));
     gaps_.move(share);
@@ -76,6 +76,7 @@ bool ContactQp::search(Vec displacement, Vec slope, double tolerance, Vec step) 
 
 bool ContactQp::solve(Vec displacement, Vec slope, double tolerance, Vec step) {
   const linear::CgInPlaceOfPreonly cg(solver_.krylov());
+  const linear::EnergyTest energy(solver_.krylov());
   const std::vector<double> multipliers = gaps_.multipliers();
   constexpr std::array shares = {1.0, 0.7, 0.35, 0.0};  // of the gaps' curvature
   bool found = false;

@@ -1,6 +1,7 @@
 #pragma once
 #include "contact_gaps.h"
 #include "repose/discrete/tangent.h"
+#include "repose/linear/energy_test.h"
 #include "repose/linear/tangent_solver.h"
 
 namespace repose::solve {

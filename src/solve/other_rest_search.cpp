@@ -18,6 +18,7 @@ using base::check;
 /// the edge.
 struct OtherSide {
   mechanics::LinearGap gap;  ///< of this rank
+  double work;               ///< N mm, of the contact's force over the gap
   /// By how much softer than its neighborhood held still the point would have to be for the other
   /// side to have as much energy.
   double softness;
@@ -55,19 +56,22 @@ bool alike(const OtherSide& a, const OtherSide& b) {
 /// Returns the sides, of this rank's points, that may have less energy than those pressed on at
 /// `displacement`, where the objective was updated last: in a model of one point, whose compliance
 /// is a few times the inverse of its block of the Hessian. Softness ascends; of sides of a
-/// constraint with normals less than 45° apart it is the softest. Collective.
+/// constraint with normals less than 45° apart it is the softest. Sides are left out over which the
+/// contact's force does hardly any work of the `value`. Collective.
 std::vector<OtherSide> promising_sides(discrete::Objective& objective, discrete::Tangent& tangent,
-                                       Vec displacement) {
-  constexpr double softest = 4;
+                                       Vec displacement, double value) {
+  constexpr double softest = 4, least_work = 1e-4;
   const mechanics::BodyContact& contact = objective.contact().bodies();
   const auto position = objective.positions().local();
   const std::vector<Mat3> blocks = diagonal_blocks(tangent, displacement, position.size());
   std::vector<OtherSide> found;
   for (mechanics::LinearGap& gap : contact.other_sides(position)) {
     const size_t c = gap.constraint;
-    const Vec3 force = contact.multipliers()[c] * gap.area * contact.normal(c);
-    const double s = softness(gap, blocks[gap.gradient.front().first].inverse(), force);
-    if (s > 0 && s < softest) found.push_back({std::move(gap), s});
+    const double force = contact.multipliers()[c] * gap.area, work = -gap.gap * force;
+    if (work < least_work * std::abs(value)) continue;
+    const double s =
+        softness(gap, blocks[gap.gradient.front().first].inverse(), force * contact.normal(c));
+    if (s > 0 && s < softest) found.push_back({std::move(gap), work, s});
   }
   std::ranges::sort(found, {}, &OtherSide::softness);
   std::vector<OtherSide> apart;
@@ -94,10 +98,7 @@ OtherRestSearch::OtherRestSearch(discrete::Objective& objective, discrete::Tange
       prediction_(objective.positions().make_vector()),
       start_(objective.positions().make_vector()) {}
 
-void OtherRestSearch::begin(Vec prediction) {
-  at_prediction_ = objective_.contact().multipliers();
-  check(VecCopy(prediction, prediction_));
-}
+void OtherRestSearch::begin(Vec prediction) { check(VecCopy(prediction, prediction_)); }
 
 /// Returns the bodies on which points press or slide near edges, ascending. Collective.
 std::vector<int32_t> OtherRestSearch::touched_near_edges(Vec displacement) {
@@ -170,7 +171,7 @@ void OtherRestSearch::consider(Vec displacement, const discrete::ContactPressure
                                double accuracy, Outcome& outcome) {
   int64_t iterations = 0;
   const End end = programs_.run(start_, accuracy, iterations);
-  const bool less = is_less(programs_.evaluate(start_), outcome.objective);
+  const bool less = is_less(programs_.value(), outcome.objective);
   OtherRest other = compare_skins(displacement, displacements(start_));
   const bool is_other = other.distance > 2 * accuracy;
   Outcome there;
@@ -202,21 +203,15 @@ OtherRestSearch::End OtherRestSearch::change_side(const OtherSide* side, Vec dis
   const double value_here = programs_.evaluate(start_);
   const double energy_here = programs_.without_contact(value_here);
   programs_.linearize(start_);
-  double work = 0;
-  std::span<const mechanics::LinearGap> beyond;
-  if (side) {
-    const mechanics::LinearGap& gap = side->gap;
-    work = -gap.gap * gap.area * objective_.contact().bodies().multipliers()[gap.constraint];
-    beyond = {&gap, 1};
-  }
-  work = base::max_over_ranks(objective_.positions().comm(), work);
+  const double work = base::max_over_ranks(objective_.positions().comm(), side ? side->work : 0.0);
+  const auto beyond = side ? std::span(&side->gap, 1) : std::span<const mechanics::LinearGap>();
   if (!programs_.step_with(beyond, start_)) return End::failed;
   if (programs_.evaluate_tissue(start_) > energy_here + promising * work) return End::failed;
   int64_t iterations = 0;
-  End end = programs_.run(start_, accuracy, iterations, 1);
-  if (end == End::failed && is_less(programs_.evaluate(start_), value_here))
-    end = programs_.run(start_, accuracy, iterations);
-  const bool less = is_less(programs_.evaluate(start_), value_here);
+  End end = programs_.go_on(start_, accuracy, iterations, 1);
+  if (end == End::failed && is_less(programs_.value(), value_here))
+    end = programs_.go_on(start_, accuracy, iterations);
+  const bool less = is_less(programs_.value(), value_here);
   return end == End::reached && !less ? End::failed : end;
 }
 
@@ -229,7 +224,7 @@ bool OtherRestSearch::change_sides(Vec displacement, double accuracy, std::set<s
   constexpr double none = std::numeric_limits<double>::infinity();
   discrete::Positions& positions = objective_.positions();
   double value = programs_.evaluate(displacement);
-  std::vector<OtherSide> sides = promising_sides(objective_, tangent_, displacement);
+  std::vector<OtherSide> sides = promising_sides(objective_, tangent_, displacement, value);
   std::erase_if(sides, [&](const OtherSide& s) { return tried.contains(s.gap.constraint); });
   size_t next = 0;
   bool changed = false;
@@ -294,13 +289,10 @@ void OtherRestSearch::find(Vec displacement, double accuracy, Outcome& outcome) 
   const std::vector<int32_t> bodies = touched_near_edges(displacement);
   if (bodies.empty()) return;
   const int64_t evaluated = objective_.evaluations();
-  for (const bool slack : {false, true}) {
-    const discrete::ContactPressures here = objective_.contact().multipliers();
-    check(VecCopy(prediction_, start_));
-    tangent_.change_contact().set_multipliers(at_prediction_);
-    if (slack) descent_.slacken(start_);
-    consider(displacement, here, accuracy, outcome);
-  }
+  const discrete::ContactPressures here = objective_.contact().multipliers();
+  check(VecCopy(prediction_, start_));
+  descent_.slacken(start_);
+  consider(displacement, here, accuracy, outcome);
   descend(displacement, accuracy, outcome);
   try_candidates(displacement, accuracy, outcome);
   if (outcome.other) outcome.other->bodies = bodies;

@@ -11,15 +11,15 @@ namespace repose::solve {
 struct OtherSide;
 
 /// Finds other rest positions of tissue that presses or slides on bodies near edges of these
-/// (docs/theory/contact.md): by programs without rounded bodies from the prediction, and from where
-/// tissue rests among bodies that hardly resist; then with single points on the other side of the
-/// edge that they press near. All members collective.
+/// (docs/theory/contact.md): by programs without rounded bodies from where tissue rests among
+/// bodies that hardly resist; then with single points on the other side of the edge that they press
+/// near. All members collective.
 class OtherRestSearch {
  public:
   OtherRestSearch(discrete::Objective& objective, discrete::Tangent& tangent,
                   ContactPrograms& programs, ContactDescent& descent);
 
-  /// Keeps a prediction, with the multipliers there, as what programs start from.
+  /// Keeps a prediction, from which tissue comes to rest among bodies that hardly resist.
   void begin(Vec prediction);
   /// Searches for rest positions of less energy than that of `displacement`, which it then becomes,
   /// with its `outcome`, which states the distance to the other.
@@ -51,7 +51,6 @@ class OtherRestSearch {
   ContactPrograms& programs_;
   ContactDescent& descent_;
   int64_t evaluations_ = 0;
-  discrete::ContactPressures at_prediction_;
   base::VecHandle prediction_, start_;
   std::vector<Candidate> candidates_;
 };

@@ -194,8 +194,8 @@ class DistanceField::Values {
   /// farther than `reach`.
   double enough_far() const { return grid_.reach + b * grid_.spacing; }
 
-  /// Exact up to rounding where it is below `reach`, otherwise `reach` or more. Where the last point
-  /// is nearer than the surface is to it or to this one, both are on one side.
+  /// Exact up to rounding where it is below `reach`, otherwise `reach` or more. Where the last
+  /// point is nearer than the surface is to it or to this one, both are on one side.
   double signed_distance(const Index& at) {
     const Vec3 point = grid_.point(at);
     const double travel = (1 + 1e-9) * (point - last_point_).norm();
