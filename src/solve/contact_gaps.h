@@ -1,5 +1,6 @@
 #pragma once
 #include <span>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -11,7 +12,13 @@ namespace repose::solve {
 /// whose minimum over d is a step of contact (docs/theory/contact.md). Multipliers begin as the
 /// objective's.
 class ContactGaps {
+  struct State;
+
  public:
+  using Blocks = std::vector<discrete::Objective::Block>;
+  using Kept =
+      std::tuple<std::vector<mechanics::LinearGap>, size_t, std::vector<State>, Blocks, Blocks>;
+
   explicit ContactGaps(discrete::Objective& objective);
 
   void set_stiffness(double stiffness) { stiffness_ = stiffness; }  ///< K, N/mm³
@@ -25,6 +32,12 @@ class ContactGaps {
   void linearize(Vec displacement, double load, std::span<const Vec3> travel);
   /// Takes a gap of a body, of this rank, in place of that of the same constraint. Not collective.
   void replace(const mechanics::LinearGap& by);
+  /// Keeps the gaps as linearize() took them, to which restore() goes back. Not collective.
+  Kept keep() const { return {gaps_, touching_, state_, curvature_, convex_curvature_}; }
+  void restore(const Kept& kept) {
+    std::tie(gaps_, touching_, state_, curvature_, convex_curvature_) = kept;
+    curvature_share_ = 1;
+  }
   /// Keeps a share of the gaps' curvature, from 0 to 1, and of the rest the semidefinite part. Not
   /// collective.
   void keep_curvature(double share) { curvature_share_ = share; }
@@ -34,7 +47,6 @@ class ContactGaps {
   /// Activates the gaps that press or slide. Returns whether the set has changed on any rank.
   /// Collective.
   bool choose_active();
-  using Blocks = std::vector<discrete::Objective::Block>;
   /// Second derivatives of the active gaps' terms: exact, and of the semidefinite relative.
   std::pair<Blocks, Blocks> blocks() const;
   /// Adds the forces −∂/∂d of the active gaps to `to`. Collective.

@@ -84,6 +84,7 @@ double ContactPrograms::take_step(Vec displacement, double length, double tissue
 
 ContactPrograms::End ContactPrograms::run(Vec displacement, double accuracy, int64_t& iterations) {
   evaluate(displacement);
+  reach_ = ContactGaps::farthest;
   return go_on(displacement, accuracy, iterations);
 }
 
@@ -92,15 +93,12 @@ ContactPrograms::End ContactPrograms::go_on(Vec displacement, double accuracy, i
   constexpr double near = 0.5, finer = 0.1;  // of the accuracy: a step that ends; a program's
   constexpr double at_saddle = 0.05;         // mm: such steps do not leave a saddle
   constexpr double fast = 0.2;               // ratio of full steps that is trusted
-  constexpr double nearest = 1;              // mm
   last_step_ = 0;
-  double reach = ContactGaps::farthest;
   for (int n = 0; n < max_steps; ++n) {
     const double tissue = without_contact(value_);
-    linearize(displacement, reach);
-    if (!qp_.solve(displacement, slope_, finer * accuracy, step_)) return End::failed;
+    linearize(displacement, reach_);
+    if (!solve(displacement, finer * accuracy)) return End::failed;
     const double length = discrete::largest_block(step_);
-    reach = std::clamp(2 * length, nearest, ContactGaps::farthest);
     const double share = take_step(displacement, length, tissue);
     if (share == 0) return End::failed;
     const double before = std::exchange(last_step_, share == 1 ? length : 0);
@@ -117,6 +115,15 @@ ContactPrograms::End ContactPrograms::go_on(Vec displacement, double accuracy, i
   return End::failed;
 }
 
+/// Solves a program for step_, whose length tells how far the next takes gaps. Returns whether it
+/// has a minimum.
+bool ContactPrograms::solve(Vec displacement, double tolerance) {
+  constexpr double nearest = 1;  // mm
+  const bool found = qp_.solve(displacement, slope_, tolerance, step_);
+  reach_ = std::clamp(2 * discrete::largest_block(step_), nearest, ContactGaps::farthest);
+  return found;
+}
+
 bool ContactPrograms::leave_lower_saddle(Vec displacement, double& latest) {
   constexpr double lower = 1e-6;  // of the value
   tangent_.forget_contact();
@@ -131,9 +138,20 @@ void ContactPrograms::linearize(Vec displacement, double reach) {
   qp_.gaps().linearize(displacement, reach);
 }
 
+ContactPrograms::Kept ContactPrograms::keep() {
+  Kept kept{qp_.gaps().keep(), objective_.positions().make_vector()};
+  check(VecCopy(slope_, kept.slope));
+  return kept;
+}
+
+void ContactPrograms::restore(const Kept& kept) {
+  qp_.gaps().restore(kept.gaps);
+  check(VecCopy(kept.slope, slope_));
+}
+
 bool ContactPrograms::step_with(std::span<const mechanics::LinearGap> gaps, Vec displacement) {
   for (const mechanics::LinearGap& gap : gaps) qp_.gaps().replace(gap);
-  if (!qp_.solve(displacement, slope_, predicted_to, step_)) return false;
+  if (!solve(displacement, predicted_to)) return false;
   check(VecAXPY(displacement, 1.0, step_));
   return true;
 }

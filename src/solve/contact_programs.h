@@ -22,7 +22,7 @@ class ContactPrograms {
   /// Takes steps until one is shorter than half of `accuracy`, or the next would be: full steps
   /// fall by at least the ratio of the latest two. Adds to `iterations`.
   End run(Vec displacement, double accuracy, int64_t& iterations);
-  /// The same from a `displacement` that was evaluated last.
+  /// The same after the step of a program to a `displacement` that was evaluated last.
   End go_on(Vec displacement, double accuracy, int64_t& iterations, int max_steps = 12);
   /// Returns whether the latest program met negative curvature.
   bool reduced() const { return qp_.reduced(); }
@@ -46,6 +46,13 @@ class ContactPrograms {
   double without_contact(double value);
   /// Takes the gaps of at most `reach` mm at `displacement`, which was evaluated last.
   void linearize(Vec displacement, double reach = ContactGaps::farthest);
+  /// A linearization, to which restore() goes back.
+  struct Kept {
+    ContactGaps::Kept gaps;
+    base::VecHandle slope;
+  };
+  Kept keep();
+  void restore(const Kept& kept);
   /// Takes the step of one program from the `displacement` of linearize(), with these gaps of
   /// bodies, of this rank, in place of those of the same constraints. Returns whether it has a
   /// minimum.
@@ -53,6 +60,7 @@ class ContactPrograms {
 
  private:
   void subtract_contact();
+  bool solve(Vec displacement, double tolerance);
   double take_step(Vec displacement, double length, double tissue);
 
   discrete::Objective& objective_;
@@ -61,6 +69,7 @@ class ContactPrograms {
   ContactQp qp_;
   Minimizer::Watch watch_;
   double value_ = 0, last_step_ = 0;
+  double reach_ = ContactGaps::farthest;             // mm, of gaps that the next step may close
   base::VecHandle gradient_, slope_, step_, trial_;  // slope_: the gradient without contact
 };
 

@@ -193,25 +193,31 @@ void OtherRestSearch::consider(Vec displacement, const discrete::ContactPressure
   tangent_.change_contact().set_multipliers(here);
 }
 
+/// Evaluates a rest position, and takes its gaps. Collective.
+OtherRestSearch::Rest OtherRestSearch::linearize(Vec displacement) {
+  const double value = programs_.evaluate(displacement);
+  const double energy = programs_.without_contact(value);
+  programs_.linearize(displacement);
+  return {value, energy, programs_.keep()};
+}
+
 /// Searches from `displacement` with one point beyond the other side of its body; ends in start_.
 /// Fails where the augmented Lagrangian is no less there, which misses the energy by the square of
 /// the gaps that are left. Collective; `side` is null on ranks that do not own the point.
 OtherRestSearch::End OtherRestSearch::change_side(const OtherSide* side, Vec displacement,
-                                                  double accuracy) {
+                                                  const Rest& rest, double accuracy) {
   constexpr double promising = 0.2;  // of the work of the contact's force over the gap
   check(VecCopy(displacement, start_));
-  const double value_here = programs_.evaluate(start_);
-  const double energy_here = programs_.without_contact(value_here);
-  programs_.linearize(start_);
+  programs_.restore(rest.linear);
   const double work = base::max_over_ranks(objective_.positions().comm(), side ? side->work : 0.0);
   const auto beyond = side ? std::span(&side->gap, 1) : std::span<const mechanics::LinearGap>();
   if (!programs_.step_with(beyond, start_)) return End::failed;
-  if (programs_.evaluate_tissue(start_) > energy_here + promising * work) return End::failed;
+  if (programs_.evaluate_tissue(start_) > rest.energy + promising * work) return End::failed;
   int64_t iterations = 0;
   End end = programs_.go_on(start_, accuracy, iterations, 1);
-  if (end == End::failed && is_less(programs_.value(), value_here))
+  if (end == End::failed && is_less(programs_.value(), rest.value))
     end = programs_.go_on(start_, accuracy, iterations);
-  const bool less = is_less(programs_.value(), value_here);
+  const bool less = is_less(programs_.value(), rest.value);
   return end == End::reached && !less ? End::failed : end;
 }
 
@@ -223,8 +229,8 @@ bool OtherRestSearch::change_sides(Vec displacement, double accuracy, std::set<s
   constexpr int max_failed = 6;  // in a row
   constexpr double none = std::numeric_limits<double>::infinity();
   discrete::Positions& positions = objective_.positions();
-  double value = programs_.evaluate(displacement);
-  std::vector<OtherSide> sides = promising_sides(objective_, tangent_, displacement, value);
+  Rest rest = linearize(displacement);
+  std::vector<OtherSide> sides = promising_sides(objective_, tangent_, displacement, rest.value);
   std::erase_if(sides, [&](const OtherSide& s) { return tried.contains(s.gap.constraint); });
   size_t next = 0;
   bool changed = false;
@@ -235,15 +241,15 @@ bool OtherRestSearch::change_sides(Vec displacement, double accuracy, std::set<s
     if (first.value == none) break;
     const bool mine = first.rank == base::rank(positions.comm());
     if (mine) tried.insert(sides[next].gap.constraint);
-    const End end = change_side(mine ? &sides[next++] : nullptr, displacement, accuracy);
+    const End end = change_side(mine ? &sides[next++] : nullptr, displacement, rest, accuracy);
     Outcome there;
     int64_t iterations = 0;
     if (end == End::reached) there = descent_.finish_reached(start_, accuracy, iterations);
     there.iterations += iterations;
-    if (there.converged && is_less(there.objective, value) &&
+    if (there.converged && is_less(there.objective, rest.value) &&
         pierced(start_) <= pierced(displacement)) {
-      value = there.objective;
       take_other(displacement, accuracy, there, outcome);
+      rest = linearize(displacement);
       changed = true;
       failed = -1;
     } else {

@@ -37,7 +37,12 @@ class OtherRestSearch {
   Outcome settle(Vec displacement, double accuracy);
   void consider(Vec displacement, const discrete::ContactPressures& here, double accuracy,
                 Outcome& outcome);
-  End change_side(const OtherSide* side, Vec displacement, double accuracy);
+  struct Rest {            ///< at the position that sides are changed from
+    double value, energy;  ///< N mm, with contact and without
+    ContactPrograms::Kept linear;
+  };
+  Rest linearize(Vec displacement);
+  End change_side(const OtherSide* side, Vec displacement, const Rest& rest, double accuracy);
   bool change_sides(Vec displacement, double accuracy, std::set<size_t>& tried, Outcome& outcome);
   bool descend(Vec displacement, double accuracy, Outcome& outcome);
   void try_candidates(Vec displacement, double accuracy, Outcome& outcome);
