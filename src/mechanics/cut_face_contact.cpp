@@ -4,6 +4,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <map>
 #include <tuple>
@@ -282,17 +283,19 @@ void CutFaceContact::update_gaps(std::span<const Vec3> position) {
     for (const auto& [p, share] : shares) sum += share * position[p];
     return sum;
   };
-  std::vector<Vec3> controls;
+  std::vector<std::vector<Vec3>> means(nets_.size() + 1);
+  for (size_t n = 0; n < nets_.size(); ++n)
+    std::ranges::transform(nets_[n].controls, std::back_inserter(means[n]), mean);
+  std::ranges::transform(places_, std::back_inserter(means.back()), mean, &Place::shares);
+  if (means == means_) return;
+  means_ = std::move(means);
   Samples samples;
   for (size_t w = 0; w < places_.size(); ++w) {
     const Place& place = places_[w];
     const Net& net = nets_[place.net];
-    if (w == 0 || places_[w - 1].net != place.net) {
-      controls.clear();
-      for (const auto& shares : net.controls) controls.push_back(mean(shares));
-      samples = Samples(net, controls);
-    }
-    const Vec3 at = mean(place.shares);
+    const std::vector<Vec3>& controls = means_[place.net];
+    if (w == 0 || places_[w - 1].net != place.net) samples = Samples(net, controls);
+    const Vec3& at = means_.back()[w];
     const auto [patch, opposite] = nearest_foot<Patch>(
         samples.near(at), {net.columns, net.rows}, at,
         [&](const Eigen::Vector2d& where) { return Patch(net, controls, where); });

@@ -144,6 +144,7 @@ class CutFaceContact {
   std::vector<Place> places_;
   std::vector<double> multiplier_;
   std::vector<Foot> feet_;
+  std::vector<std::vector<Vec3>> means_;  // mm, that feet_ follow from: [nets][controls], [places]
   std::vector<std::array<int32_t, 2>> links_;
 };
 
