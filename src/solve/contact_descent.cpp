@@ -56,7 +56,7 @@ void ContactDescent::slacken(Vec displacement) {
 
 ContactDescent::End ContactDescent::approach(Vec displacement, double accuracy,
                                              int64_t& iterations) {
-  constexpr double roughly = 0.1, finely = 0.004;  // mm
+  constexpr double roughly = 0.1, finely = 0.02;  // mm
   objective_.contact().round_edges(true);
   soften();
   const Outcome near = minimizer_.presolve(displacement, std::max(roughly, accuracy));
