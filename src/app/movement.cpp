@@ -123,7 +123,7 @@ std::string describe_lips(const scene::Landmarks& landmarks, const Vec3& up,
   const bool first_is_upper = extent_above(one, up, initial) > extent_above(other, up, initial);
   const double gap = (first_is_upper ? 1 : -1) * up.dot(moved[one] - moved[other]);
   if (gap < closed) return "Lips closed. ";
-  return fmt::format("Lips {:.1f} mm apart at stomion, together before. ", gap);
+  return fmt::format("Lips {:.1f} mm apart at stomion, closed at first. ", gap);
 }
 
 std::string describe_trust(const solve::Summary& summary, double discretization) {

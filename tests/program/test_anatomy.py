@@ -201,7 +201,7 @@ def test_lips_part_and_do_not_hold_to_teeth(run, tmp_path, head):
         return way[np.argsort(off)[:3]].mean()
 
     assert ratio("pogonion_soft") > 0.9
-    stated, = re.findall(r"Lips (\d\.\d) mm apart at stomion, together before\.", result.stdout)
+    stated, = re.findall(r"Lips (\d\.\d) mm apart at stomion, closed at first\.", result.stdout)
     assert abs(float(stated) - lip_gap(model["point/position"][skin], rest[skin], head)) < 0.06
     assert ratio("lower_lip") < 0.93 and ratio("upper_lip") < 0.3
     assert run("repose-check", "face.h5").returncode == 0

@@ -119,7 +119,7 @@ def link(source, folder, name):
     """The file in the scene's folder, by the part it plays; its name there."""
     source = pathlib.Path(source)
     if not source.is_file():
-        raise Refusal(f"{source}: no such file")
+        raise Refusal(f"{source}: {'is a folder, expected a file' if source.is_dir() else 'no such file'}")
     ending = ".mrk.json" if source.name.endswith(".mrk.json") else source.suffix
     target = folder / (name + ending)
     if ending.lower() == ".ply" and (turned := in_lps(source.read_bytes(), source)):

@@ -30,13 +30,13 @@ std::string after(const Vec3& upper, const Vec3& lower) {
 }
 
 TEST(LipGap, IsMeasuredUpwards) {
-  EXPECT_EQ(after({0, -1, 2.5}, {0, 3, 0}), "Lips 2.5 mm apart at stomion, together before. ");
-  EXPECT_EQ(after({0, 0, 0}, {0, 0, -1}), "Lips 1.0 mm apart at stomion, together before. ");
+  EXPECT_EQ(after({0, -1, 2.5}, {0, 3, 0}), "Lips 2.5 mm apart at stomion, closed at first. ");
+  EXPECT_EQ(after({0, 0, 0}, {0, 0, -1}), "Lips 1.0 mm apart at stomion, closed at first. ");
 }
 
 /// The landmarks of lips that hardly move would not show which of the two points is the upper.
 TEST(LipGap, ASmallGapAndAnOverlapAreNotConfused) {
-  EXPECT_EQ(after({0, 0, 0.125}, {0, 0, 0}), "Lips 0.1 mm apart at stomion, together before. ");
+  EXPECT_EQ(after({0, 0, 0.125}, {0, 0, 0}), "Lips 0.1 mm apart at stomion, closed at first. ");
   EXPECT_EQ(after({0, 0, -0.125}, {0, 0, 0}), "Lips closed. ");
 }
 
