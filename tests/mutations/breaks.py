@@ -291,8 +291,8 @@ BREAKS = [
     ),
     (
         "a sign reaches beyond the surface",
-        "travel < std::abs(last_distance_)",
-        "travel < 3 * std::abs(last_distance_)",
+        "travel < std::max(std::abs(last_distance_), distance)",
+        "travel < 3 * std::max(std::abs(last_distance_), distance)",
         r"^surface\.distance_field",
     ),
     (
@@ -486,8 +486,8 @@ BREAKS = [
     ),
     (
         "rest positions are searched for from the prediction alone",
-        "for (const bool slack : {false, true})",
-        "for (const bool slack : {false})",
+        "descent_.slacken(start_);",
+        "",
         r"^program\.contact$",
     ),
     (
@@ -498,7 +498,7 @@ BREAKS = [
     ),
     (
         "a point goes to another side in one search alone",
-        "if (end == End::failed && is_less(programs_.evaluate(start_), value_here))",
+        "if (end == End::failed && is_less(programs_.value(), rest.value))",
         "if (false)",
         r"^program\.contact$",
     ),
