@@ -54,12 +54,11 @@ void ContactDescent::slacken(Vec displacement) {
   tangent_.change_contact().set_stiffness(stiffness_);
 }
 
-ContactDescent::End ContactDescent::approach(Vec displacement, double accuracy,
-                                             int64_t& iterations) {
+ContactDescent::End ContactDescent::approach(Vec displacement, int64_t& iterations) {
   constexpr double roughly = 0.1, finely = 0.02;  // mm
   objective_.contact().round_edges(true);
   soften();
-  const Outcome near = minimizer_.presolve(displacement, std::max(roughly, accuracy));
+  const Outcome near = minimizer_.presolve(displacement, roughly);
   harden(displacement);
   iterations += near.iterations;
   const End end = near.stopped ? End::stopped : programs_.run(displacement, finely, iterations);

@@ -19,7 +19,7 @@ class ContactDescent {
   void slacken(Vec displacement);
   /// Finds the rest position among bodies with rounded edges, which catch fewer points on either
   /// side. It is found so finely that the sides do not depend on the way to it.
-  End approach(Vec displacement, double accuracy, int64_t& iterations);
+  End approach(Vec displacement, int64_t& iterations);
   /// Ends the search where a strict estimate says that it is over.
   Outcome finish(Vec displacement, double accuracy);
   /// finish() at a position that programs have reached. They go on where it misses the accuracy: an

@@ -12,21 +12,20 @@ namespace repose::solve {
 /// round an edge, or released from one of them. The multipliers of a load are where the next
 /// begins. At load 1, where points press near an edge of a body, other rest positions are searched
 /// for (OtherRestSearch): that of least energy is taken, and the outcome states the distance of
-/// another.
+/// another. The accuracy does not choose between them: that is done at an accuracy of its own.
 class ContactSearch : public RestSearch {
  public:
   /// `tangent` is the objective's Hessian, `solver` solves with it, `minimizer` minimizes
   /// it.
   ContactSearch(discrete::Objective& objective, discrete::Tangent& tangent,
                 linear::TangentSolver& solver, Minimizer& minimizer, Minimizer::Watch watch);
-  /// Sets if find_other() searches (the default).
+  /// Sets if other rest positions are searched for (the default).
   void enable_other_rest(bool enabled) { finds_other_ = enabled; }
   int64_t evaluations_for_other() const { return other_.evaluations(); }
   std::optional<bool> predict(Vec displacement, double load, Vec increment) override;
   Outcome run(Vec displacement, double accuracy) override;
   /// By quadratic programs alone, as long as they serve.
   Outcome run_near(Vec displacement, double accuracy) override;
-  void find_other(Vec displacement, double accuracy, Outcome& outcome) override;
   discrete::ContactPressures pressures() const override {
     return objective_.contact().multipliers();
   }
@@ -36,6 +35,9 @@ class ContactSearch : public RestSearch {
 
  private:
   using End = ContactPrograms::End;
+  Outcome search(Vec displacement);
+  Outcome search_near(Vec displacement);
+  Outcome choose(Vec displacement, double accuracy, Outcome outcome);
 
   discrete::Objective& objective_;
   discrete::Tangent& tangent_;

@@ -169,11 +169,12 @@ Outcome OtherRestSearch::settle(Vec displacement, double accuracy) {
 /// states the distance to the other; the multipliers at `displacement` are `here`. Collective.
 void OtherRestSearch::consider(Vec displacement, const discrete::ContactPressures& here,
                                double accuracy, Outcome& outcome) {
+  constexpr double apart = 0.2;  // mm, of skins, to count as another one of more energy
   int64_t iterations = 0;
   const End end = programs_.run(start_, accuracy, iterations);
   const bool less = is_less(programs_.value(), outcome.objective);
   OtherRest other = compare_skins(displacement, displacements(start_));
-  const bool is_other = other.distance > 2 * accuracy;
+  const bool is_other = other.distance > (less ? 2 * accuracy : apart);
   Outcome there;
   if (is_other && less && end == End::reached)
     there = descent_.finish_reached(start_, accuracy, iterations);

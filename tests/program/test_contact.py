@@ -92,6 +92,42 @@ def test_a_restart_that_refines_a_result_stays_at_its_rest_position(folder, envi
     assert last(folder / "fine.h5")["objective"] == pytest.approx(17.0900, abs=5e-4)
 
 
+def test_the_accuracy_does_not_choose_the_rest_position(folder, environment):
+    """That is chosen at 0.02 mm: a coarser accuracy changes no bit of the face, a finer one leads it on."""
+    run = runner(folder, environment)
+    moved = shipped("head_genioplasty.yaml").partition("moves:")[0]
+    (folder / "chin_and_jaw.yaml").write_text(
+        moved + "moves:\n  - {bone: chin, translate: [0.6, -2.4, -2.5]}\n"
+                "  - {bone: mandible, translate: [1.3, -2.2, 2.1]}\n")
+    faces = []
+    for accuracy in (0.5, 0.02, 1e-4):
+        done = run("repose-solve", "chin_and_jaw.yaml", "-accuracy", accuracy, "-output", "chosen")
+        assert (done.returncode, done.stderr) == (0, ""), done
+        step = last(folder / "chosen.h5")
+        assert step["displacement_error"] <= accuracy
+        faces.append(step["point/position"])
+    assert np.array_equal(faces[0], faces[1])
+    assert 1e-4 < np.linalg.norm(faces[2] - faces[1], axis=1).max() < 0.02
+
+
+@real_head
+@pytest.mark.long
+def test_neither_accuracy_nor_restart_leaves_the_chosen_rest_position(folder, environment):
+    """Rest positions of a split ramus lie up to 0.95 mm apart, and chosen at 0.1 mm it was another one."""
+    run = runner(folder, environment)
+    scene = (folder / "real_head_split.yaml").read_text().partition("moves:\n")[0]
+    turned = "moves:\n  - {bone: jaw, translate: [0, -5, 0], rotate: {axis: [0, 0, 1], angle: 4, center: [0, -230, 340]}}\n"
+    (folder / "turned.yaml").write_text(scene + turned)
+    faces = []
+    for options in (("-accuracy", 0.1), ("-accuracy", 0.005),
+                    ("-accuracy", 0.001, "-restart", "turned0.h5", "-skip_other_rest")):
+        done = run("repose-solve", "turned.yaml", *options, "-output", f"turned{len(faces)}")
+        assert (done.returncode, done.stderr) == (0, ""), done
+        faces.append(skin(folder / f"turned{len(faces)}.h5")[1])
+    for face in faces[1:]:
+        assert np.linalg.norm(face - faces[0], axis=1).max() < 0.02
+
+
 def test_requested_load_steps_change_no_bit_of_the_face(folder, environment):
     run = runner(folder, environment)
     (folder / "coarse_le_fort.yaml").write_text(shipped("head_le_fort.yaml", edge=7))
