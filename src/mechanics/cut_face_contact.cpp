@@ -179,14 +179,13 @@ Eigen::Vector2d step_to_nearest(const Patch& patch, const Vec3& offset,
   return step;
 }
 
-/// Where on a surface of `columns` × `rows` controls `at` is nearest to, by Newton's method;
-/// whether that is not its end. `evaluate` returns the surface at a place.
-template <class Evaluate>
-auto nearest_place(Eigen::Vector2d where, const Eigen::Vector2d& maximum, const Vec3& at,
-                   Evaluate&& evaluate) {
+/// Returns the place of a net's surface that is nearest to `at`, by Newton's method; whether that
+/// is not its end. `evaluate` returns the surface at a place.
+template <class Net, class Evaluate>
+auto nearest_place(const Net& net, Eigen::Vector2d where, const Vec3& at, Evaluate&& evaluate) {
   constexpr int max_steps = 60, max_halved = 20;
   constexpr double longest = 0.5, exact = 1e-13;  // of a patch
-  const Eigen::Vector2d minimum(-1, -1);
+  const Eigen::Vector2d minimum = net.begin(), maximum = net.end();
   auto patch = evaluate(where);
   for (int n = 0; n < max_steps; ++n) {
     const Vec3 offset = at - patch.point;
@@ -210,14 +209,13 @@ auto nearest_place(Eigen::Vector2d where, const Eigen::Vector2d& maximum, const 
 
 /// Returns the nearest of the places that nearest_place() finds from `starts`. On a surface bent
 /// round an edge these may be different ones.
-template <class Patch, class Evaluate>
-std::pair<Patch, bool> nearest_foot(const std::vector<Eigen::Vector2d>& starts,
-                                    const Eigen::Vector2d& maximum, const Vec3& at,
-                                    Evaluate&& evaluate) {
+template <class Patch, class Net, class Evaluate>
+std::pair<Patch, bool> nearest_foot(const Net& net, const std::vector<Eigen::Vector2d>& starts,
+                                    const Vec3& at, Evaluate&& evaluate) {
   std::pair<Patch, bool> nearest;
   double distance = std::numeric_limits<double>::infinity();
   for (const Eigen::Vector2d& start : starts) {
-    auto found = nearest_place(start, maximum, at, evaluate);
+    auto found = nearest_place(net, start, at, evaluate);
     const double there = (at - found.first.point).norm();
     if (!(there >= distance)) std::tie(nearest, distance) = std::pair(std::move(found), there);
   }
@@ -249,10 +247,10 @@ std::vector<CutFaceContact::Touched> CutFaceContact::touched(size_t w) const {
 }
 
 CutFaceContact::Samples::Samples(const Net& net, const std::vector<Vec3>& controls) {
-  for (double i = -1; i <= net.columns; i += step)
-    for (double j = -1; j <= net.rows; j += step)
+  for (double i = net.begin()[0]; i <= net.end()[0]; i += step)
+    for (double j = net.begin()[1]; j <= net.end()[1]; j += step)
       point.push_back(Patch(net, {i, j}).sum(controls, 0, 0));
-  rows = static_cast<int>((net.rows + 1) / step) + 1;
+  rows = static_cast<int>((net.end() - net.begin())[1] / step) + 1;
   columns = static_cast<int>(point.size()) / rows;
 }
 
@@ -263,16 +261,15 @@ std::vector<Eigen::Vector2d> CutFaceContact::Samples::near(const Vec3& at) const
   const double largest = times * times * *std::ranges::min_element(square);
   const auto is_least = [&](int sample) {
     const int i = sample / rows, j = sample % rows;
-    for (int k = std::max(0, i - 1); k < std::min(columns, i + 2); ++k)
-      for (int l = std::max(0, j - 1); l < std::min(rows, j + 2); ++l)
-        if (square[k * rows + l] < square[sample]) return false;
-    return true;
+    return !((i > 0 && square[sample - rows] < square[sample]) ||
+             (i + 1 < columns && square[sample + rows] < square[sample]) ||
+             (j > 0 && square[sample - 1] < square[sample]) ||
+             (j + 1 < rows && square[sample + 1] < square[sample]));
   };
   std::vector<Eigen::Vector2d> found;
   for (int sample = 0; sample < columns * rows; ++sample)
     if (square[sample] <= largest && is_least(sample))
-      found.push_back(step * Eigen::Vector2d(sample / rows, sample % rows) -
-                      Eigen::Vector2d::Ones());
+      found.push_back(Net::begin() + step * Eigen::Vector2d(sample / rows, sample % rows));
   if (found.empty()) found.push_back({0, 0});  // at positions that are not finite
   return found;
 }
@@ -297,7 +294,7 @@ void CutFaceContact::update_gaps(std::span<const Vec3> position) {
     if (w == 0 || places_[w - 1].net != place.net) samples = Samples(net, controls);
     const Vec3& at = means_.back()[w];
     const auto [patch, opposite] = nearest_foot<Patch>(
-        samples.near(at), {net.columns, net.rows}, at,
+        net, samples.near(at), at,
         [&](const Eigen::Vector2d& where) { return Patch(net, controls, where); });
     const Vec3 across = patch.first.cross(patch.second), offset = at - patch.point;
     Foot& foot = feet_[w];

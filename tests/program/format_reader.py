@@ -482,6 +482,7 @@ class Net:
 
     def __init__(self, size, controls):
         self.columns, self.rows = size
+        self.ends = np.array([(-1.0, 0.0), (self.columns, self.rows - 1.0)])
         self.controls = controls  # [(points, weights)]
         self.last = None
 
@@ -500,9 +501,9 @@ class Net:
         return np.einsum("ij,ijx->x", self.weights(where, derivatives), self.places(position))
 
     def samples(self, position):
-        """The surface at multiples of a half from −1 on."""
-        along, inwards = (np.array([straight_on(at, count, 0) for at in np.arange(-1, count + 0.5, 0.5)])
-                          for count in (self.columns, self.rows))
+        """The surface at multiples of a half from its first end on."""
+        along, inwards = (np.array([straight_on(at, count, 0) for at in np.arange(first, last + 0.5, 0.5)])
+                          for count, first, last in zip((self.columns, self.rows), *self.ends))
         return np.einsum("ik,jl,klx->ijx", along, inwards, self.places(position))
 
     def shares(self, weights):
@@ -545,16 +546,16 @@ class Cut:
     def gap(self, position, own):
         """The gap of a place and, where the surface is opposite, force(area) of unit pressure."""
         at, other = self.first.point(position, own), self.second
-        ends = np.array([other.columns, other.rows], float)
+        first, last = other.ends
         samples = other.samples(position)
         far = np.linalg.norm(samples - at, axis=2)
-        least = minimum_filter(far, 3, mode="nearest") == far
-        feet = [self.foot(position, at, 0.5 * start - 1, ends)
+        least = minimum_filter(far, footprint=[[0, 1, 0], [1, 1, 1], [0, 1, 0]], mode="nearest") == far
+        feet = [self.foot(position, at, first + 0.5 * start)
                 for start in np.argwhere(least & (far <= 2 * far.min()))]
         where = min(feet, key=lambda foot: np.linalg.norm(at - other.point(position, foot)))
         way = at - other.point(position, where)
         normal = np.cross(*(other.point(position, where, order) for order in ((1, 0), (0, 1))))
-        if (where <= -1).any() or (where >= ends).any():
+        if (where <= first).any() or (where >= last).any():
             return np.linalg.norm(way), None
         normal /= np.linalg.norm(normal)
 
@@ -567,7 +568,7 @@ class Cut:
             return found
         return way @ normal, force
 
-    def foot(self, position, at, where, ends):
+    def foot(self, position, at, where):
         """The nearest place of the second side, by Newton's method."""
         s = lambda place, *order: self.second.point(position, place, order)
         for _ in range(60):
@@ -579,7 +580,7 @@ class Cut:
                 bend = first @ first.T
             step = np.linalg.solve(bend, first @ way)
             step *= min(1, 0.5 / max(np.abs(step).max(), 1e-13))
-            there = np.clip(where + step, -1, ends)
+            there = np.clip(where + step, *self.second.ends)
             for _ in range(20):
                 if np.linalg.norm(at - s(there, 0, 0)) <= np.linalg.norm(way):
                     break

@@ -65,15 +65,13 @@ def test_an_operation_gives_one_face_on_any_ranks_and_in_any_steps(solve, operat
 
 
 @pytest.mark.long
-def test_any_minimizer_ends_at_the_position_of_less_energy_and_reports_the_other(folder, environment):
+def test_any_minimizer_ends_at_the_position_of_less_energy(folder, environment):
     """A point at the saw-cut edge of the maxilla also rests on its front, with more energy."""
     run = runner(folder, environment)
     for options, ranks in (((), 1), ((), 3), (("-tao_type", "ntr"), 1), (("-tao_type", "cg"), 1)):
         done = run("repose-solve", "advanced.yaml", "-output", "edge", *options, ranks=ranks)
         assert (done.returncode, done.stderr) == (0, ""), done
         assert last(folder / "edge.h5")["objective"] == pytest.approx(17.0900, abs=5e-4)
-        (distance, *_), = np.array(OTHER.findall(done.stdout), float)
-        assert distance == pytest.approx(0.27, abs=0.05)
 
 
 @pytest.fixture(scope="module")
@@ -113,11 +111,12 @@ def test_the_accuracy_does_not_choose_the_rest_position(folder, environment):
 @real_head
 @pytest.mark.long
 def test_neither_accuracy_nor_restart_leaves_the_chosen_rest_position(folder, environment):
-    """Rest positions of a split ramus lie up to 0.95 mm apart, and chosen at 0.1 mm it was another one."""
+    """With multipliers of 0 a restart left it, to a skin 4 mm away at single points."""
     run = runner(folder, environment)
     scene = (folder / "real_head_split.yaml").read_text().partition("moves:\n")[0]
-    turned = "moves:\n  - {bone: jaw, translate: [0, -5, 0], rotate: {axis: [0, 0, 1], angle: 4, center: [0, -230, 340]}}\n"
-    (folder / "turned.yaml").write_text(scene + turned)
+    (folder / "turned.yaml").write_text(
+        scene + "moves:\n  - {bone: jaw, translate: [0, -5, 0]}\n"
+                "  - {bone: jaw, rotate: {axis: [0, 0, 1], angle: -4, center: [0, -230, 340]}}\n")
     faces = []
     for options in (("-accuracy", 0.1), ("-accuracy", 0.005),
                     ("-accuracy", 0.001, "-restart", "turned0.h5", "-skip_other_rest")):
@@ -126,6 +125,17 @@ def test_neither_accuracy_nor_restart_leaves_the_chosen_rest_position(folder, en
         faces.append(skin(folder / f"turned{len(faces)}.h5")[1])
     for face in faces[1:]:
         assert np.linalg.norm(face - faces[0], axis=1).max() < 0.02
+
+
+@real_head
+def test_lips_meet_no_continuation_of_each_other_beyond_their_nets(folder, environment):
+    """Straight on by a row, one came out in front of the other lip: no rest after 6500 evaluations."""
+    scene = (folder / "real_head_split.yaml").read_text().replace("[0, -6, 0]", "[0, -4.2, 0]")
+    (folder / "less.yaml").write_text(scene)
+    done = runner(folder, environment)("repose-solve", "less.yaml", "-accuracy", 0.01, "-output", "less",
+                                       "-skip_other_rest")
+    assert (done.returncode, done.stderr) == (0, ""), done
+    assert last(folder / "less.h5")["evaluations"] <= 60
 
 
 def test_requested_load_steps_change_no_bit_of_the_face(folder, environment):

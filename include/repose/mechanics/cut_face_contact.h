@@ -69,6 +69,11 @@ class CutFaceContact {
   /// A point's part in ∂g, T_1·∂r, T_2·∂r, n·∂r_,1 and n·∂r_,2, r = place − foot, as columns.
   using Touched = std::pair<int32_t, Eigen::Matrix<double, 3, 5>>;
   struct Net {
+    /// Parameters at the surface's ends, beyond which nothing is opposite: a column farther than
+    /// the net along the cut, the last rows inwards.
+    static Eigen::Vector2d begin() { return {-1, 0}; }
+    Eigen::Vector2d end() const { return {columns, rows - 1}; }
+
     int columns, rows;
     std::vector<std::vector<Share>> controls;  // column by column
   };
@@ -100,7 +105,7 @@ class CutFaceContact {
     SplineWeights along, inwards;
     Vec3 point, first, second, first_first, first_second, second_second;
   };
-  /// A net's surface at places `step` apart, as far as it goes on beyond its ends.
+  /// A net's surface at places `step` apart, up to its ends.
   struct Samples {
     Samples() = default;
     Samples(const Net& net, const std::vector<Vec3>& controls);

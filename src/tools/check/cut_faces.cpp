@@ -38,8 +38,8 @@ class Side {
         control += cuts.weight[k] * position[cuts.point[k]];
       controls_.push_back(control);
     }
-    for (int i = 0; i <= 2 * (columns + 1); ++i)
-      for (int j = 0; j <= 2 * (rows + 1); ++j) halves_[{i, j}] = point(at_half(i, j));
+    for (int i = -2; i <= 2 * columns; ++i)
+      for (int j = 0; j <= 2 * (rows - 1); ++j) halves_[{i, j}] = point(at_half(i, j));
   }
 
   Vec3 point(const Parameters& at) const {
@@ -50,7 +50,8 @@ class Side {
     return {sum(at, [](double x, double y) { return bell_slope(x) * bell(y); }),
             sum(at, [](double x, double y) { return bell(x) * bell_slope(y); })};
   }
-  Parameters end() const { return {columns_, rows_}; }
+  static Parameters begin() { return {-1, 0}; }
+  Parameters end() const { return {columns_, rows_ - 1}; }
   /// Half parameters where this is nearer to a place than at those around.
   std::vector<Parameters> nearer_than_around(const Vec3& place) const {
     std::vector<Parameters> found;
@@ -91,11 +92,11 @@ class Side {
     return sum;
   }
 
-  static Parameters at_half(int i, int j) { return {0.5 * i - 1, 0.5 * j - 1}; }
+  static Parameters at_half(int i, int j) { return {0.5 * i, 0.5 * j}; }
 
   int columns_, rows_;
   std::vector<Vec3> controls_;                 // column by column
-  std::map<std::array<int, 2>, Vec3> halves_;  // points, from −1 on
+  std::map<std::array<int, 2>, Vec3> halves_;  // points, from begin() to end()
 };
 
 /// Parameters at which the distance to `place` is least, from `at` on: steps to the best of 24
@@ -108,7 +109,8 @@ Parameters descend(const Side& side, const Vec3& place, Parameters at, double fi
     Parameters best = at;
     for (const double i : {-1.0, -0.5, 0.0, 0.5, 1.0})
       for (const double j : {-1.0, -0.5, 0.0, 0.5, 1.0}) {
-        const Parameters next = (at + step * Parameters(i, j)).cwiseMax(-1.0).cwiseMin(side.end());
+        const Parameters next =
+            (at + step * Parameters(i, j)).cwiseMax(side.begin()).cwiseMin(side.end());
         const double squared = (side.point(next) - place).squaredNorm();
         if (squared >= minimum) continue;
         minimum = squared;
@@ -129,8 +131,8 @@ Foot foot_from(const Side& side, const Vec3& place, const Parameters& start, dou
   const Vec3 offset = place - side.point(foot);
   const auto [along, inwards] = side.slopes(foot);
   const Vec3 normal = along.cross(inwards);
-  const bool opposite =
-      foot.minCoeff() > -1 + at_end && (side.end() - foot).minCoeff() > at_end && normal.norm() > 0;
+  const bool opposite = (foot - side.begin()).minCoeff() > at_end &&
+                        (side.end() - foot).minCoeff() > at_end && normal.norm() > 0;
   return {offset.norm(), opposite ? normal.normalized().dot(offset) : offset.norm()};
 }
 

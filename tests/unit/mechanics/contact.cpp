@@ -295,7 +295,7 @@ TEST(CutFaceContact, MeasuresGapsFromTheNearestFootOfASurfaceBentRoundAnEdge) {
     const Vec3 place = mean(w / rows, w % rows, 0);
     double nearest = std::numeric_limits<double>::infinity();
     for (double i = -1; i <= columns; i += 0.05)
-      for (double j = -1; j <= rows; j += 0.05)
+      for (double j = 0; j <= rows - 1; j += 0.05)
         nearest = std::min(nearest, (mean(i, j, columns * rows) - place).norm());
     EXPECT_LE(std::abs(contact.gap(w)), nearest + 1e-6);
   }
