@@ -166,7 +166,7 @@ void Run::copy_result(const std::filesystem::path& file) const {
 std::optional<base::Exit> Run::restart(const std::filesystem::path& file) {
   const results::Restart from =
       results::read_restart(comm, file, discrete::gather_model(comm, job_.local_model));
-  start_ = {from.position, from.guess};
+  start_ = {from.position, from.guess, false, from.pressure};
   strategy_.settings.path.start_load = from.load;
   earlier_ = file;
   kept_ = strategy_.tears ? 0 : from.kept;

@@ -126,6 +126,7 @@ Numbers numbers_of(const model::Model& m) {
 Restart read_restart(MPI_Comm comm, const std::filesystem::path& file, const model::Model& model) {
   Restart restart;
   std::vector<Vec3> all;
+  std::vector<double> pressures;
   base::on_root(comm, [&] {
     const model::Model stored = read_model(file);
     refuse_another_model(file, stored, model);
@@ -138,9 +139,13 @@ Restart read_restart(MPI_Comm comm, const std::filesystem::path& file, const mod
     const bool last = found.row + 1 == step_count(file);
     if (same && last && restart.load == 1) restart.end = found.step.numbers;
     all = std::move(found.step.rows.position);
+    pressures.assign(all.size(), 0.0);
+    for (model::PointField& field : found.step.rows.point_fields)
+      if (field.name == "contact_pressure") pressures = std::move(field.values);
   });
   base::broadcast(comm, restart.guess, restart.load, restart.kept);
   restart.position = base::scatter(comm, all);
+  restart.pressure = base::scatter(comm, pressures);
   return restart;
 }
 

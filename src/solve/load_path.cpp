@@ -247,7 +247,6 @@ PathOutcome LoadPath::run(Vec displacement, Vec guess, const OnStep& on_step) {
     if (result_.leapt) return result_;
   }
   const base::VecHandle start = positions.make_vector();
-  const discrete::ContactPressures at_start = search_.pressures();
   settle(displacement, on_step);
   if (guess && !settings_.near_guess && result_.last.converged && !result_.last.stopped &&
       result_.load < 1)
@@ -258,7 +257,7 @@ PathOutcome LoadPath::run(Vec displacement, Vec guess, const OnStep& on_step) {
   }
   follow(displacement, requested_step(), 1 - requested_step(), on_step);
   if (result_.last.converged && !result_.last.stopped && result_.load < 1)
-    follow_again(start, at_start, displacement, on_step);
+    follow_again(start, displacement, on_step);
   return result_;
 }
 
@@ -295,14 +294,13 @@ void LoadPath::follow(Vec displacement, double longest, double end, const OnStep
 /// Goes to load 1 from the `start` of the path, in automatic steps of which the last is reported,
 /// as if no others had been requested: linear solvers and contact are reset first. Where they
 /// fail, the path continues from `displacement`, which the requested steps have reached.
-void LoadPath::follow_again(Vec start, const discrete::ContactPressures& at_start, Vec displacement,
-                            const OnStep& on_step) {
+void LoadPath::follow_again(Vec start, Vec displacement, const OnStep& on_step) {
   const double begin = MPI_Wtime();
   const discrete::ContactPressures reached_pressures = search_.pressures();
   const PathOutcome reached = result_;
   discrete::Positions& positions = objective_.positions();
   problem_.reset();
-  search_.set_pressures(at_start);
+  search_.set_pressures({});
   begun_ = function_.evaluations();
   refused_ = 0;
   result_.load = 0;

@@ -337,13 +337,14 @@ class Steps {
   int64_t evaluations_ = 0;  // up to the step before
 };
 
-/// Sets contact to the pressures at a guess of the rest position at load 1. Collective.
-void begin_near(const Start& start, const discrete::NaturalRows& natural, Vec guess,
-                discrete::Objective& objective) {
+/// Sets contact to the pressures at a displacement that a search continues from. Collective.
+void continue_contact(const Start& start, const discrete::NaturalRows& natural, Vec displacement,
+                      double load, discrete::Objective& objective) {
   discrete::Positions& positions = objective.positions();
-  if (!positions.part().contact) return;
-  positions.set_load(1);
-  positions.update(guess);
+  if (!positions.part().contact || !base::on_any_rank(positions.comm(), !start.pressure.empty()))
+    return;
+  positions.set_load(load);
+  positions.update(displacement);
   objective.contact().place_bodies();
   objective.contact().set_pressures(natural.owned(start.pressure));
 }
@@ -389,7 +390,7 @@ std::shared_ptr<const linear::KeptPreconditioner> RestSolver::make_preconditione
   s.problem.reset();
   s.positions.set_load(1);
   s.positions.update(displacement);
-  begin_near(rest, s.natural, displacement, s.problem.objective());
+  continue_contact(rest, s.natural, displacement, 1, s.problem.objective());
   return s.problem.elastic_solver().make_kept(displacement);
 }
 
@@ -411,7 +412,10 @@ Summary RestSolver::find(const Settings& settings, const Start& start, const Rec
   Steps steps(searcher, settings, natural, state_->penetration, receive, summary);
   PathSettings along = settings.path;
   along.near_guess = start.near && positions.largest_travel() > 0;
-  if (along.near_guess) begin_near(start, natural, guess, searcher.objective());
+  if (along.near_guess)
+    continue_contact(start, natural, guess, 1, searcher.objective());
+  else if (!start.guess && along.start_load > 0)
+    continue_contact(start, natural, displacement, along.start_load, searcher.objective());
   LoadPath path(searcher.problem(), searcher.search(), along);
   summary.path =
       path.run(displacement, guess, [&](const Outcome& outcome, double load, double seconds) {

@@ -14,8 +14,9 @@ namespace repose::results {
 /// Where a run left off.
 struct Restart {
   double load = 0;
-  std::vector<Vec3> position;  ///< [this rank's slab of N] mm
-  bool guess = false;          ///< the position is one of a search at load 1 that was not done
+  std::vector<Vec3> position;    ///< [this rank's slab of N] mm
+  std::vector<double> pressure;  ///< [the same slab] N/mm², of contact there; 0 where unknown
+  bool guess = false;            ///< the position is one of a search at load 1 that was not done
   int64_t kept = 0;  ///< steps of the file before this one, where its model is the same throughout
   /// On rank 0: the first array of the file's model that differs from the input's; empty: none.
   std::string differing;

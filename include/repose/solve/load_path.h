@@ -95,8 +95,7 @@ class LoadPath {
   bool follows(const Attempt& now, const std::optional<Attempt>& coarser) const;
   void settle(Vec displacement, const OnStep& on_step);
   void follow(Vec displacement, double longest, double end, const OnStep& on_step);
-  void follow_again(Vec start, const discrete::ContactPressures& at_start, Vec displacement,
-                    const OnStep& on_step);
+  void follow_again(Vec start, Vec displacement, const OnStep& on_step);
   void try_guess(Vec displacement, Vec guess, const OnStep& on_step);
   void accept(const Outcome& outcome, double load, Vec displacement);
   void reject_step(const Attempt& tried);

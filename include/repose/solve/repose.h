@@ -144,9 +144,10 @@ struct Start {
   /// `position` is a guess of the rest position at load 1, tried before the path is followed;
   /// otherwise the state at the settings' start_load.
   bool guess = false;
-  /// The guess is near to rest: it is tried before anything else, with contact at `pressure`.
-  bool near = false;
-  std::vector<double> pressure = {};  ///< N/mm², [points] this rank's slab
+  bool near = false;  ///< the guess is near to rest: it is tried before anything else
+  /// N/mm², [points] this rank's slab: of contact at a near guess or at the start_load; empty:
+  /// none.
+  std::vector<double> pressure = {};
   /// From RestSolver::make_preconditioner, for a guess that is near rest; or null.
   std::shared_ptr<const linear::KeptPreconditioner> preconditioner = {};
 };
