@@ -187,9 +187,8 @@ void OtherRestSearch::consider(Vec displacement, const discrete::ContactPressure
   }
   if (is_other && !less && end == End::reached && pierced(start_) == 0) {
     keep_farther(std::move(other), outcome);
-    candidates_.push_back(
-        {objective_.positions().make_vector(), objective_.contact().multipliers()});
-    check(VecCopy(start_, candidates_.back().displacement));
+    candidate_ = {objective_.positions().make_vector(), objective_.contact().multipliers()};
+    check(VecCopy(start_, candidate_->displacement));
   }
   tangent_.change_contact().set_multipliers(here);
 }
@@ -270,24 +269,24 @@ bool OtherRestSearch::descend(Vec displacement, double accuracy, Outcome& outcom
   return passes > 0;
 }
 
-/// Changes sides from rest positions that have hardly more energy, too, and takes the end of those
-/// with less. Collective.
-void OtherRestSearch::try_candidates(Vec displacement, double accuracy, Outcome& outcome) {
+/// Changes sides from a rest position that has hardly more energy, too, and takes the end of that
+/// where it has less. Collective.
+void OtherRestSearch::try_candidate(Vec displacement, double accuracy, Outcome& outcome) {
   constexpr double hardly = 0.015;  // of the energy
-  for (const Candidate& candidate : std::exchange(candidates_, {})) {
-    const discrete::ContactPressures here = objective_.contact().multipliers();
-    tangent_.change_contact().set_multipliers(candidate.pressures);
-    check(VecCopy(candidate.displacement, start_));
-    Outcome there;
-    const double more = programs_.evaluate(start_) - outcome.objective;
-    const bool changed = more < hardly * std::abs(outcome.objective) &&
-                         descend(candidate.displacement, accuracy, there);
-    if (changed && is_less(there.objective, outcome.objective)) {
-      check(VecCopy(candidate.displacement, start_));
-      take_other(displacement, accuracy, std::move(there), outcome);
-    } else {
-      tangent_.change_contact().set_multipliers(here);
-    }
+  const std::optional<Candidate> candidate = std::exchange(candidate_, {});
+  if (!candidate) return;
+  const discrete::ContactPressures here = objective_.contact().multipliers();
+  tangent_.change_contact().set_multipliers(candidate->pressures);
+  check(VecCopy(candidate->displacement, start_));
+  Outcome there;
+  const double more = programs_.evaluate(start_) - outcome.objective;
+  const bool changed = more < hardly * std::abs(outcome.objective) &&
+                       descend(candidate->displacement, accuracy, there);
+  if (changed && is_less(there.objective, outcome.objective)) {
+    check(VecCopy(candidate->displacement, start_));
+    take_other(displacement, accuracy, std::move(there), outcome);
+  } else {
+    tangent_.change_contact().set_multipliers(here);
   }
 }
 
@@ -301,7 +300,7 @@ void OtherRestSearch::find(Vec displacement, double accuracy, Outcome& outcome) 
   descent_.slacken(start_);
   consider(displacement, here, accuracy, outcome);
   descend(displacement, accuracy, outcome);
-  try_candidates(displacement, accuracy, outcome);
+  try_candidate(displacement, accuracy, outcome);
   if (outcome.other) outcome.other->bodies = bodies;
   programs_.evaluate(displacement);
   evaluations_ += objective_.evaluations() - evaluated;

@@ -1,6 +1,7 @@
 #pragma once
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <set>
 #include <vector>
 
@@ -45,7 +46,7 @@ class OtherRestSearch {
   End change_side(const OtherSide* side, Vec displacement, const Rest& rest, double accuracy);
   bool change_sides(Vec displacement, double accuracy, std::set<size_t>& tried, Outcome& outcome);
   bool descend(Vec displacement, double accuracy, Outcome& outcome);
-  void try_candidates(Vec displacement, double accuracy, Outcome& outcome);
+  void try_candidate(Vec displacement, double accuracy, Outcome& outcome);
   void take_other(Vec displacement, double accuracy, Outcome there, Outcome& outcome);
   void keep_farther(OtherRest other, Outcome& outcome);
   OtherRest compare_skins(Vec displacement, std::vector<Vec3> other);
@@ -57,7 +58,7 @@ class OtherRestSearch {
   ContactDescent& descent_;
   int64_t evaluations_ = 0;
   base::VecHandle prediction_, start_;
-  std::vector<Candidate> candidates_;
+  std::optional<Candidate> candidate_;
 };
 
 }  // namespace repose::solve

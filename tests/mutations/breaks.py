@@ -327,6 +327,12 @@ BREAKS = [
         r"^model\.cut|^program\.(contact|incisions)",
     ),
     (
+        "sides of cuts that go on beyond their last rows",
+        "Eigen::Vector2d end() const { return {columns, rows - 1}; }",
+        "Eigen::Vector2d end() const { return {columns, rows}; }",
+        r"^mechanics\.contact|^check\.cut_faces",
+    ),
+    (
         "teeth reach no farther than their region",
         "return (x - sphere.center).norm() <= sphere.radius + near;",
         "return (x - sphere.center).norm() <= sphere.radius;",

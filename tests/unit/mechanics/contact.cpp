@@ -301,6 +301,31 @@ TEST(CutFaceContact, MeasuresGapsFromTheNearestFootOfASurfaceBentRoundAnEdge) {
   }
 }
 
+TEST(CutFaceContact, MeetsNothingBeyondItsLastRows) {
+  constexpr int columns = 4, rows = 4;
+  for (const double beyond : {-0.6, 0.6}) {
+    model::CutFaces sides{{{columns, rows}}, {0}, {}, {}, {}};
+    std::vector<Vec3> position;
+    for (int c = 0; c < 2 * columns * rows; ++c) {
+      const int column = c / rows % columns, row = c % rows;
+      const bool first = c < columns * rows;
+      sides.point.push_back(c);
+      sides.weight.push_back(1);
+      sides.begin.push_back(c + 1);
+      position.push_back(first ? Vec3(2 * column, 2 * (rows - 1) + beyond, -0.8)
+                               : Vec3(2 * column, 2 * row, 0));
+      if (first) sides.area.push_back(row == 1 ? 1 : 0);
+    }
+    CutFaceContact contact(sides, 1);
+    contact.update_gaps(position);
+    ASSERT_EQ(contact.size(), columns);
+    for (int w = 0; w < columns; ++w) {
+      EXPECT_NEAR(contact.gap(w), beyond < 0 ? -0.8 : 1, 1e-9);
+      EXPECT_NEAR(contact.pressure(w), beyond < 0 ? 0.8 : 0, 1e-9);
+    }
+  }
+}
+
 /// Expects that gaps change along a direction as their gradients say.
 template <class Gaps>
 void expect_linear(const std::vector<Vec3>& position, Gaps&& gaps) {
