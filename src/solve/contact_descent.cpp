@@ -127,6 +127,21 @@ Outcome ContactDescent::stopped(Vec displacement, Outcome outcome) {
   return outcome;
 }
 
+Outcome continued(Outcome before, Outcome next) {
+  next.iterations += before.iterations;
+  next.other = std::move(before.other);
+  return next;
+}
+
+Outcome ContactDescent::refine(Vec displacement, double accuracy, Outcome outcome) {
+  if (outcome.converged && outcome.displacement_error > accuracy)
+    outcome = continued(std::move(outcome), settle(displacement, accuracy, most_rounds, false));
+  if (!outcome.converged && (outcome.stable || outcome.displacement_error > accuracy))
+    outcome.reason = fmt::format("contact did not converge: {:.3g} mm of gaps remain",
+                                 objective_.contact().violation());
+  return outcome;
+}
+
 Outcome ContactDescent::settle(Vec displacement, double accuracy, int max_rounds,
                                bool needs_presolve) {
   constexpr int max_left = 20, stiffest = 16;

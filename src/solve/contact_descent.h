@@ -3,6 +3,14 @@
 
 namespace repose::solve {
 
+/// mm, to which a rest position is chosen whatever the accuracy: on which side of an edge a point
+/// rests depends on this.
+inline constexpr double chosen_to = 0.02;
+inline constexpr int most_rounds = 8;  ///< of programs
+
+/// Returns the `next` outcome of a search as that of all, with the `before` that it continues from.
+Outcome continued(Outcome before, Outcome next);
+
 /// Stages of a search with contact: soft quasi-Newton searches, programs among rounded bodies,
 /// rounds of programs, and the estimate that ends it. All members collective.
 class ContactDescent {
@@ -28,6 +36,9 @@ class ContactDescent {
   /// Ends at rest by rounds of programs from a position near it: after a soft search where they do
   /// not reach it, with a stiffer penalty in each round.
   Outcome settle(Vec displacement, double accuracy, int max_rounds, bool needs_presolve);
+  /// Leads a rest position that was found to chosen_to on to a finer accuracy; explains an outcome
+  /// that is none.
+  Outcome refine(Vec displacement, double accuracy, Outcome outcome);
   /// Returns the outcome of a search that is stopped at `displacement`.
   Outcome stopped(Vec displacement, Outcome outcome = {});
 

@@ -19,13 +19,14 @@ class ContactSearch : public RestSearch {
   /// it.
   ContactSearch(discrete::Objective& objective, discrete::Tangent& tangent,
                 linear::TangentSolver& solver, Minimizer& minimizer, Minimizer::Watch watch);
-  /// Sets if other rest positions are searched for (the default).
+  /// Sets if find_other() searches (the default).
   void enable_other_rest(bool enabled) { finds_other_ = enabled; }
   int64_t evaluations_for_other() const { return other_.evaluations(); }
   std::optional<bool> predict(Vec displacement, double load, Vec increment) override;
   Outcome run(Vec displacement, double accuracy) override;
   /// By quadratic programs alone, as long as they serve.
   Outcome run_near(Vec displacement, double accuracy) override;
+  void find_other(Vec displacement, double accuracy, Outcome& outcome) override;
   discrete::ContactPressures pressures() const override {
     return objective_.contact().multipliers();
   }
@@ -35,9 +36,7 @@ class ContactSearch : public RestSearch {
 
  private:
   using End = ContactPrograms::End;
-  Outcome search(Vec displacement);
-  Outcome search_near(Vec displacement);
-  Outcome choose(Vec displacement, double accuracy, Outcome outcome);
+  Outcome end(Vec displacement, double accuracy, Outcome outcome);
 
   discrete::Objective& objective_;
   discrete::Tangent& tangent_;

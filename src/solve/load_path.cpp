@@ -158,6 +158,7 @@ void LoadPath::settle(Vec displacement, const OnStep& on_step) {
   objective_.positions().set_load(result_.load);
   result_.last = settings_.start_load > 0 ? search_.run_near(displacement, settings_.accuracy)
                                           : search_.run(displacement, settings_.accuracy);
+  if (result_.load == 1) search_.find_other(displacement, settings_.accuracy, result_.last);
   result_.iterations += result_.last.iterations;
   require_value(result_.last, result_.load);
   objective_.positions().update(displacement);
@@ -194,6 +195,7 @@ void LoadPath::try_guess(Vec displacement, Vec guess, const OnStep& on_step) {
   objective_.positions().set_load(1);
   Outcome outcome = settings_.near_guess ? search_.run_near(trial_, settings_.accuracy)
                                          : search_.run(trial_, settings_.accuracy);
+  search_.find_other(trial_, settings_.accuracy, outcome);
   result_.iterations += outcome.iterations;
   if (outcome.stopped || (outcome.converged && inverted(trial_) <= folded_before)) {
     accept(outcome, 1, displacement);
@@ -273,6 +275,7 @@ void LoadPath::follow(Vec displacement, double longest, double end, const OnStep
     const double load = target > 1 - nearly ? 1 : target;
     Attempt tried = begin_step(displacement, load);
     tried.outcome = search_.run(trial_, settings_.accuracy);
+    if (load == 1) search_.find_other(trial_, settings_.accuracy, tried.outcome);
     end_step(tried);
     const bool last = halvings == max_halvings || in_vain(tried);
     if (tried.outcome.stopped || last || follows(tried, coarser)) {

@@ -291,19 +291,24 @@ void OtherRestSearch::try_candidate(Vec displacement, double accuracy, Outcome& 
 }
 
 void OtherRestSearch::find(Vec displacement, double accuracy, Outcome& outcome) {
-  if (!outcome.converged || outcome.overlapped > 0) return;
-  const std::vector<int32_t> bodies = touched_near_edges(displacement);
-  if (bodies.empty()) return;
-  const int64_t evaluated = objective_.evaluations();
-  const discrete::ContactPressures here = objective_.contact().multipliers();
-  check(VecCopy(prediction_, start_));
-  descent_.slacken(start_);
-  consider(displacement, here, accuracy, outcome);
-  descend(displacement, accuracy, outcome);
-  try_candidate(displacement, accuracy, outcome);
-  if (outcome.other) outcome.other->bodies = bodies;
-  programs_.evaluate(displacement);
-  evaluations_ += objective_.evaluations() - evaluated;
+  if (outcome.stopped) return;
+  const std::vector<int32_t> bodies = outcome.converged && outcome.overlapped == 0
+                                          ? touched_near_edges(displacement)
+                                          : std::vector<int32_t>();
+  if (!bodies.empty()) {
+    const int64_t evaluated = objective_.evaluations();
+    const discrete::ContactPressures here = objective_.contact().multipliers();
+    check(VecCopy(prediction_, start_));
+    descent_.slacken(start_);
+    consider(displacement, here, chosen_to, outcome);
+    descend(displacement, chosen_to, outcome);
+    try_candidate(displacement, chosen_to, outcome);
+    if (outcome.other) outcome.other->bodies = bodies;
+    programs_.evaluate(displacement);
+    evaluations_ += objective_.evaluations() - evaluated;
+  }
+  outcome = descent_.refine(displacement, accuracy, std::move(outcome));
+  if (outcome.other && outcome.other->distance <= 2 * accuracy) outcome.other.reset();
 }
 
 void OtherRestSearch::keep_farther(OtherRest other, Outcome& outcome) {

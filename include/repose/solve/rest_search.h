@@ -59,8 +59,8 @@ class RestSearch {
   virtual std::optional<bool> predict(Vec /*displacement*/, double /*load*/, Vec /*increment*/) {
     return {};
   }
-  /// From `displacement` (changed in place) at the positions' load, to `accuracy` mm. At load 1 it
-  /// may take a rest position of less energy that it finds, too. Collective.
+  /// From `displacement` (changed in place) at the positions' load, to `accuracy` mm; at load 1
+  /// find_other() completes it. Collective.
   virtual Outcome run(Vec displacement, double accuracy) = 0;
   /// Comes within about `distance` mm of rest, for another search to continue from there. Returns
   /// the iterations and whether it was stopped. Collective.
@@ -69,6 +69,10 @@ class RestSearch {
   virtual Outcome run_near(Vec displacement, double accuracy) {
     return run(displacement, accuracy);
   }
+  /// Searches for other rest positions of load 1 after the search that ended at `displacement` with
+  /// this outcome. These become the position of least energy, to `accuracy` mm, with its outcome,
+  /// which states the distance to another. Collective.
+  virtual void find_other(Vec /*displacement*/, double /*accuracy*/, Outcome& /*outcome*/) {}
   /// Returns the multipliers of contact with which the next search begins.
   virtual discrete::ContactPressures pressures() const { return {}; }
   /// Sets the multipliers of contact, as where a step is rejected; empty ones are 0. Collective.
