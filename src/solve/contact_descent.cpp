@@ -68,10 +68,10 @@ ContactDescent::End ContactDescent::approach(Vec displacement, int64_t& iteratio
 
 Outcome ContactDescent::finish(Vec displacement, double accuracy) {
   tangent_.forget_contact();
-  Outcome outcome =
-      minimizer_.finish(displacement, (1 - missed) * accuracy, programs_.take_last_step());
+  const auto [step, left] = programs_.take_last_step();
+  Outcome outcome = minimizer_.finish(displacement, (1 - missed) * accuracy, step);
   objective_.positions().update(displacement);
-  outcome.displacement_error += contact_safety * objective_.contact().violation();
+  outcome.displacement_error += contact_safety * std::max(left, objective_.contact().violation());
   const MPI_Comm comm = objective_.positions().comm();
   const mechanics::BodyContact& contact = objective_.contact().bodies();
   outcome.overlapped = base::sum_over_ranks(comm, contact.count_released());

@@ -28,6 +28,7 @@ double change(const LinearGap& gap, std::span<const Vec3> moved) {
 ContactGaps::ContactGaps(discrete::Objective& objective)
     : objective_(objective),
       stiffness_(objective.positions().part().model.contact.stiffness),
+      least_stiffness_(stiffness_),
       moved_(objective.positions().local().size(), Vec3::Zero()),
       forces_(objective.positions().make_vector()) {}
 
@@ -92,6 +93,13 @@ void ContactGaps::replace(const LinearGap& by) {
   for (auto* blocks : {&curvature_, &convex_curvature_})
     std::erase_if(
         *blocks, [&](const discrete::Objective::Block& b) { return b.p == point && b.q == point; });
+}
+
+void ContactGaps::stiffen() {
+  constexpr double factor = 4, most = 64;
+  if (stiffness_ >= most * least_stiffness_) return;
+  stiffness_ *= factor;
+  for (State& state : state_) state.active = -1;
 }
 
 void ContactGaps::begin() {

@@ -21,7 +21,10 @@ class ContactGaps {
 
   explicit ContactGaps(discrete::Objective& objective);
 
-  void set_stiffness(double stiffness) { stiffness_ = stiffness; }  ///< K, N/mm³
+  void set_stiffness(double stiffness) { stiffness_ = least_stiffness_ = stiffness; }  ///< K, N/mm³
+  /// Takes four times the stiffness, of at most 64 times the one that was set. Not collective.
+  void stiffen();
+  void relax() { stiffness_ = least_stiffness_; }  ///< to the stiffness that was set
 
   static constexpr double farthest = 5;  ///< mm: gaps beyond do not close in a step
 
@@ -92,7 +95,7 @@ class ContactGaps {
   };
 
   discrete::Objective& objective_;
-  double stiffness_;
+  double stiffness_, least_stiffness_;
   std::vector<mechanics::LinearGap> gaps_;  // of bodies, then of the sides of cuts
   size_t touching_ = 0;                     // of them, at bodies
   std::vector<State> state_;                // [gaps]

@@ -34,6 +34,7 @@ bool ContactPrograms::predict(Vec displacement, double load, Vec increment) {
   objective_.contact().place_bodies();
   const std::vector<Vec3> travel = positions.travel_to(load);
   objective_.contact().round_edges(true);
+  qp_.gaps().relax();
   check(VecSet(gradient_, 0));  // it is at rest
   subtract_contact();
   qp_.gaps().linearize(displacement, load, travel);
@@ -88,12 +89,20 @@ ContactPrograms::End ContactPrograms::run(Vec displacement, double accuracy, int
   return go_on(displacement, accuracy, iterations);
 }
 
+/// Returns a full step of so many mm after one of `before`, or 0. Steps that go on to fall by the
+/// same ratio θ leave θ / (1 − θ) times the latest; ½ where θ is not known.
+ContactPrograms::Step ContactPrograms::after(double before, double length) {
+  constexpr double most = 0.99;
+  const double ratio = before > 0 ? std::min(length / before, most) : 0.5;
+  return {length, length * ratio / (1 - ratio)};
+}
+
 ContactPrograms::End ContactPrograms::go_on(Vec displacement, double accuracy, int64_t& iterations,
                                             int max_steps) {
-  constexpr double near = 0.5, finer = 0.1;  // of the accuracy: a step that ends; a program's
-  constexpr double at_saddle = 0.05;         // mm: such steps do not leave a saddle
-  constexpr double fast = 0.2;               // ratio of full steps that is trusted
-  last_step_ = 0;
+  constexpr double near = 0.25, finer = 0.1;  // of the accuracy: a distance that ends; a program's
+  constexpr double at_saddle = 0.05;          // mm: such steps do not leave a saddle
+  qp_.gaps().relax();
+  last_ = {};
   for (int n = 0; n < max_steps; ++n) {
     const double tissue = without_contact(value_);
     linearize(displacement, reach_);
@@ -101,12 +110,10 @@ ContactPrograms::End ContactPrograms::go_on(Vec displacement, double accuracy, i
     const double length = discrete::largest_block(step_);
     const double share = take_step(displacement, length, tissue);
     if (share == 0) return End::failed;
-    const double before = std::exchange(last_step_, share == 1 ? length : 0);
+    last_ = share == 1 ? after(last_.step, length) : Step{0, length};
     ++iterations;
     if (qp_.reduced() && length <= at_saddle) return End::failed;
-    const bool falls = last_step_ > 0 && last_step_ <= fast * before;
-    const double next = falls ? length * length / before : length;
-    if (!qp_.reduced() && next <= near * accuracy) return End::reached;
+    if (!qp_.reduced() && last_.left <= near * accuracy) return End::reached;
     if (watch_ && !watch_({iterations, objective_.positions().load(), value_,
                            discrete::largest_block(gradient_), length, objective_.evaluations(),
                            displacement}))
@@ -150,6 +157,7 @@ void ContactPrograms::restore(const Kept& kept) {
 }
 
 bool ContactPrograms::step_with(std::span<const mechanics::LinearGap> gaps, Vec displacement) {
+  qp_.gaps().relax();
   for (const mechanics::LinearGap& gap : gaps) qp_.gaps().replace(gap);
   constexpr double tried_to = 0.02;  // mm: coarser steps end elsewhere on other ranks
   if (!solve(displacement, tried_to)) return false;

@@ -19,15 +19,19 @@ class ContactPrograms {
   bool predict(Vec displacement, double load, Vec increment);
 
   enum class End { reached, failed, stopped };
-  /// Takes steps until one is shorter than half of `accuracy`, or the next would be: full steps
-  /// fall by at least the ratio of the latest two. Adds to `iterations`.
+  /// Takes steps until those that follow lead less than a quarter of `accuracy` farther. Adds to
+  /// `iterations`.
   End run(Vec displacement, double accuracy, int64_t& iterations);
   /// The same after the step of a program to a `displacement` that was evaluated last.
   End go_on(Vec displacement, double accuracy, int64_t& iterations, int max_steps = 12);
   /// Returns whether the latest program met negative curvature.
   bool reduced() const { return qp_.reduced(); }
-  /// Returns the full step that the latest run ended with, mm, or 0; from then on 0.
-  double take_last_step() { return std::exchange(last_step_, 0.0); }
+  /// A full step, or 0, and how far the next ones lead, mm.
+  struct Step {
+    double step = 0, left = 0;
+  };
+  /// Returns what the latest run ended with; from then on 0.
+  Step take_last_step() { return std::exchange(last_, {}); }
 
   /// Leaves a saddle, unless its value is no less than that of the `latest` one, to which the
   /// search may have returned.
@@ -59,6 +63,7 @@ class ContactPrograms {
   bool step_with(std::span<const mechanics::LinearGap> gaps, Vec displacement);
 
  private:
+  static Step after(double before, double length);
   void subtract_contact();
   bool solve(Vec displacement, double tolerance);
   double take_step(Vec displacement, double length, double tissue);
@@ -68,7 +73,8 @@ class ContactPrograms {
   linear::TangentSolver& solver_;
   ContactQp qp_;
   Minimizer::Watch watch_;
-  double value_ = 0, last_step_ = 0;
+  double value_ = 0;
+  Step last_;
   double reach_ = ContactGaps::farthest;             // mm, of gaps that the next step may close
   base::VecHandle gradient_, slope_, step_, trial_;  // slope_: the gradient without contact
 };

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
+#include <utility>
 
 namespace repose::solve {
 
@@ -62,6 +64,9 @@ bool ContactQp::minimize(Vec displacement, Vec slope, double tolerance, Vec step
 bool ContactQp::search(Vec displacement, Vec slope, double tolerance, Vec step) {
   constexpr int max_rounds = 3;  // the next program goes on with the multipliers
   constexpr double share = 0.1;  // of the step
+  constexpr double slow = 0.6;   // ratio of the latest two changes of multipliers
+  constexpr double near = 0.2;   // mm: with larger changes a stiffer penalty leads elsewhere
+  double before = std::numeric_limits<double>::infinity();
   check(VecSet(step, 0));
   check(VecSet(force_, 0));
   gaps_.begin();
@@ -70,6 +75,8 @@ bool ContactQp::search(Vec displacement, Vec slope, double tolerance, Vec step) 
     if (!minimize(displacement, slope, tolerance, step)) return false;
     const double changed = gaps_.move_multipliers();
     if (changed <= std::max(tolerance, share * discrete::largest_block(step))) break;
+    const bool falls = changed <= slow * std::exchange(before, changed);
+    if (!falls && changed <= near) gaps_.stiffen();
   }
   return true;
 }

@@ -3,11 +3,12 @@
 
     tests/benchmark/contact.py [-bin build/bin] [-head ../shared/data/head] [-accuracy 0.01]
                                [-output docs/measurements/contact.md] [-cases "jaw 8 mm back,…"]
-                               [-tables cost,runs,searches,ways] [-picture contact.png]
+                               [-tables cost,runs,estimates,searches,ways] [-picture contact.png]
                                [-dilatation prism]
 
 cost: each move with parted and with fused lips, with contact and without it. runs: the same on 1, 2, 3
-and 5 ranks and in 2, 5 and 10 load steps, against one rank and automatic steps. searches: the present
+and 5 ranks and in 2, 5 and 10 load steps, against one rank and automatic steps. estimates: the stated
+distance to rest against the largest of all points to the same rest position, found far finer. searches: the present
 search and a logarithmic barrier (benchmark_barrier), lips parted. ways: tissue near the moved bone let
 go (neither contact nor any hold there), tied to the bones, sliding on them, and touching them, the
 default; lips are parted. Points inside bone are free ones that are deeper in one of the moved surfaces
@@ -63,6 +64,8 @@ COST = ("| move | lips | evaluations, Hessians | without contact | search's time
         "| another rest position, mm |\n|---|---" + "|--:" * 7 + "|")
 AGREE = ("| move | lips | evaluations, one step | ten steps | ranks 2, 3, 5: mm | load steps 2, 5, 10: mm "
          "| not converged |\n|---|---" + "|--:" * 5 + "|")
+ESTIMATES = ("| move | lips | stated, mm | true, mm | true / stated | evaluations | … to the finer one |\n"
+             "|---|---" + "|--:" * 5 + "|")
 SEARCHES = ("| move | search | evaluations | Hessians or Newton systems | search's time | exact penetration, "
             "mm | skin from the present search's, mm |\n|---|---" + "|--:" * 5 + "|")
 KINDS = {"ranks": [(2, 0), (3, 0), (5, 0)], "steps": [(1, 2), (1, 5), (1, 10)]}
@@ -206,6 +209,19 @@ def compare_runs(chosen, folder):
                        f"{worst['ranks']} | {worst['steps']} | {failed} |")
 
 
+def compare_estimates(chosen, folder):
+    for case in chosen.cases.split(","):
+        for lips in LIPS:
+            found = [solve(scene_of(case, lips=lips), chosen, folder,
+                           options=["-accuracy", accuracy, "-skip_other_rest"])
+                     for accuracy in (0.02, 0.0005)]
+            rough, fine = (last(file) for _, file in found)
+            apart = np.linalg.norm(rough["point/position"] - fine["point/position"], axis=1).max()
+            stated = rough["displacement_error"]
+            yield (f"| {case} | {lips} | {stated:.4f} | {apart:.4f} | {apart / stated:.2f} | "
+                   + " | ".join(str(done.evaluations[0]) for done, _ in found) + " |")
+
+
 def compare_searches(chosen, folder):
     for case in chosen.cases.split(","):
         text = scene_of(case)
@@ -244,7 +260,8 @@ def draw(faces, chosen):
 
 
 def main():
-    chosen = option_parser(__doc__, cases=",".join(CASES), tables="cost,runs,searches,ways",
+    chosen = option_parser(__doc__, cases=",".join(CASES),
+                           tables="cost,runs,estimates,searches,ways",
                            accuracy=0.01, head=str(PROJECT.parent / "shared/data/head"),
                            picture="", dilatation="prism").parse_args()
     faces = {}
@@ -255,6 +272,7 @@ def main():
             (folder / file.name).symlink_to(file.resolve())
         tables = {"cost": (COST, lambda: compare_cost(chosen, folder)),
                   "runs": (AGREE, lambda: compare_runs(chosen, folder)),
+                  "estimates": (ESTIMATES, lambda: compare_estimates(chosen, folder)),
                   "searches": (SEARCHES, lambda: compare_searches(chosen, folder)),
                   "ways": (HEAD, lambda: compare_ways(chosen, folder, faces))}
         for table in chosen.tables.split(","):

@@ -255,9 +255,15 @@ BREAKS = [
     ),
     (
         "what passes into bone is not in the estimate",
-        "outcome.displacement_error += contact_safety * objective_.contact().violation();",
+        "outcome.displacement_error += contact_safety * std::max(left, objective_.contact().violation());",
         "",
         r"^solve\.contact",
+    ),
+    (
+        "a program goes on with multipliers that hardly move",
+        "if (!falls && changed <= near) gaps_.stiffen();",
+        "static_cast<void>(falls);",
+        r"^program\.contact",
     ),
     (
         "a penalty that is too soft stays so",
