@@ -68,8 +68,8 @@ ContactDescent::End ContactDescent::approach(Vec displacement, int64_t& iteratio
 
 Outcome ContactDescent::finish(Vec displacement, double accuracy) {
   tangent_.forget_contact();
-  const auto [step, left] = programs_.take_last_step();
-  Outcome outcome = minimizer_.finish(displacement, (1 - missed) * accuracy, step);
+  const auto [length, left] = programs_.take_last_step();
+  Outcome outcome = minimizer_.finish(displacement, (1 - missed) * accuracy, length);
   objective_.positions().update(displacement);
   outcome.displacement_error += contact_safety * std::max(left, objective_.contact().violation());
   const MPI_Comm comm = objective_.positions().comm();

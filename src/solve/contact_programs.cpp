@@ -89,8 +89,8 @@ ContactPrograms::End ContactPrograms::run(Vec displacement, double accuracy, int
   return go_on(displacement, accuracy, iterations);
 }
 
-/// Returns a full step of so many mm after one of `before`, or 0. Steps that go on to fall by the
-/// same ratio θ leave θ / (1 − θ) times the latest; ½ where θ is not known.
+/// Returns a full step of `length` mm after one of `before`, or 0. Steps that fall on by the same
+/// ratio θ lead θ / (1 − θ) times as far; ½ is taken where θ is not known.
 ContactPrograms::Step ContactPrograms::after(double before, double length) {
   constexpr double most = 0.99;
   const double ratio = before > 0 ? std::min(length / before, most) : 0.5;
@@ -110,7 +110,7 @@ ContactPrograms::End ContactPrograms::go_on(Vec displacement, double accuracy, i
     const double length = discrete::largest_block(step_);
     const double share = take_step(displacement, length, tissue);
     if (share == 0) return End::failed;
-    last_ = share == 1 ? after(last_.step, length) : Step{0, length};
+    last_ = share == 1 ? after(last_.length, length) : Step{0, length};
     ++iterations;
     if (qp_.reduced() && length <= at_saddle) return End::failed;
     if (!qp_.reduced() && last_.left <= near * accuracy) return End::reached;

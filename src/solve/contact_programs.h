@@ -26,11 +26,11 @@ class ContactPrograms {
   End go_on(Vec displacement, double accuracy, int64_t& iterations, int max_steps = 12);
   /// Returns whether the latest program met negative curvature.
   bool reduced() const { return qp_.reduced(); }
-  /// A full step, or 0, and how far the next ones lead, mm.
+  /// Length of a full step, or 0, and how far those that follow would lead, mm.
   struct Step {
-    double step = 0, left = 0;
+    double length = 0, left = 0;
   };
-  /// Returns what the latest run ended with; from then on 0.
+  /// Returns the step that the latest run ended with; from then on 0.
   Step take_last_step() { return std::exchange(last_, {}); }
 
   /// Leaves a saddle, unless its value is no less than that of the `latest` one, to which the
