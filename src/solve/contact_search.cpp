@@ -50,17 +50,22 @@ Outcome ContactSearch::run_near(Vec displacement, double accuracy) {
   check(VecCopy(displacement, guess));
   other_.begin(displacement);
   objective_.contact().bodies().restore_released();
-  descent_.stiffen(1);
+  const discrete::ContactPressures given = objective_.contact().multipliers();
   int64_t iterations = 0;
-  const End end_of_programs = programs_.run(displacement, chosen_to, iterations);
-  if (end_of_programs == End::stopped) return descent_.stopped(displacement);
-  if (end_of_programs == End::reached) {
-    Outcome outcome = descent_.finish_reached(displacement, chosen_to, iterations);
-    outcome.iterations += iterations;
-    if (outcome.converged) return end(displacement, accuracy, std::move(outcome));
+  for (const int times :
+       {1, 8}) {  // the search that ended here may have needed more than the model's
+    descent_.stiffen(times);
+    const End end_of_programs = programs_.run(displacement, chosen_to, iterations);
+    if (end_of_programs == End::stopped) return descent_.stopped(displacement);
+    if (end_of_programs == End::reached) {
+      Outcome outcome = descent_.finish_reached(displacement, chosen_to, iterations);
+      outcome.iterations += iterations;
+      if (outcome.converged) return end(displacement, accuracy, std::move(outcome));
+    }
+    tangent_.change_contact().set_multipliers(given);
+    check(VecCopy(guess, displacement));
   }
   tangent_.change_contact().set_multipliers({});
-  check(VecCopy(guess, displacement));
   Outcome outcome = run(displacement, accuracy);
   outcome.iterations += iterations;
   return outcome;
