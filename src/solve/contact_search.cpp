@@ -52,8 +52,8 @@ Outcome ContactSearch::run_near(Vec displacement, double accuracy) {
   objective_.contact().bodies().restore_released();
   const discrete::ContactPressures given = objective_.contact().multipliers();
   int64_t iterations = 0;
-  for (const int times :
-       {1, 8}) {  // the search that ended here may have needed more than the model's
+  // The search that ended here may have needed a stiffer penalty than the model's.
+  for (const int times : {1, 8}) {
     descent_.stiffen(times);
     const End end_of_programs = programs_.run(displacement, chosen_to, iterations);
     if (end_of_programs == End::stopped) return descent_.stopped(displacement);
