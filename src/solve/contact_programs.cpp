@@ -34,7 +34,6 @@ bool ContactPrograms::predict(Vec displacement, double load, Vec increment) {
   objective_.contact().place_bodies();
   const std::vector<Vec3> travel = positions.travel_to(load);
   objective_.contact().round_edges(true);
-  qp_.gaps().relax();
   check(VecSet(gradient_, 0));  // it is at rest
   subtract_contact();
   qp_.gaps().linearize(displacement, load, travel);
